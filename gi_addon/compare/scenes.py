@@ -1,0 +1,296 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Test scenes made by code: Cornell boxes, the integrating sphere, form-factor patches and their like.
+
+They are plain Scenes; ``host/build.py`` puts the same scenes into Blender, so that Cycles renders what Quartet does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..scene import (
+    CAMERA,
+    Camera,
+    Instances,
+    Light,
+    Link,
+    Material,
+    Mesh,
+    Node,
+    Scene,
+    ShaderGraph,
+    World,
+)
+
+WHITE = (0.725, 0.71, 0.68)
+RED = (0.63, 0.065, 0.05)
+GREEN = (0.14, 0.45, 0.091)
+
+
+# --- materials, lights, cameras ---------------------------------------------------------------------------------------
+
+
+def diffuse(color: Sequence[float], name: str = "Diffuse") -> Material:
+    """A Lambert surface: Diffuse BSDF of ``color``."""
+    return Material(name, ShaderGraph((Node("BSDF_DIFFUSE", name, {"Color": tuple(color)}),), Link(0, "BSDF")))
+
+
+def principled(name: str = "Principled", **inputs: float | Sequence[float]) -> Material:
+    """A Principled BSDF with socket values by name (``Base_Color=…``)."""
+    values = {k.replace("_", " "): tuple(v) if isinstance(v, (tuple, list)) else float(v) for k, v in inputs.items()}
+    return Material(name, ShaderGraph((Node("BSDF_PRINCIPLED", name, values),), Link(0, "BSDF")))
+
+
+def emissive(color: Sequence[float], strength: float, name: str = "Emission") -> Material:
+    """A surface that emits radiance ``color`` × ``strength``."""
+    inputs = {"Color": tuple(color), "Strength": float(strength)}
+    return Material(name, ShaderGraph((Node("EMISSION", name, inputs),), Link(0, "Emission")))
+
+
+def world(color: Sequence[float] = (0.0, 0.0, 0.0), strength: float = 1.0, ao_distance: float = 10.0) -> World:
+    """A world of one radiance."""
+    node = Node("BACKGROUND", "Background", {"Color": tuple(color), "Strength": float(strength)})
+    return World(ShaderGraph((node,), Link(0, "Background")), ao_distance)
+
+
+def look_at(eye: Sequence[float], target: Sequence[float], up: Sequence[float] = (0.0, 0.0, 1.0)) -> np.ndarray:
+    """world_from_view (4, 4) of a camera or light at ``eye`` looking along −Z at ``target``."""
+    eye, target = np.asarray(eye, "f8"), np.asarray(target, "f8")
+    z = eye - target
+    z /= np.linalg.norm(z)
+    x = np.cross(up, z)
+    if np.linalg.norm(x) < 1e-9:
+        x = np.cross((0.0, 1.0, 0.0), z)
+    x /= np.linalg.norm(x)
+    out = np.eye(4)
+    out[:3, 0], out[:3, 1], out[:3, 2], out[:3, 3] = x, np.cross(z, x), z, eye
+    return out
+
+
+def perspective(
+    eye: Sequence[float], target: Sequence[float], fov: float = 0.7, aspect: float = 16 / 9,
+    clip: tuple[float, float] = (0.01, 1000.0),
+) -> Camera:  # fmt: skip
+    """A perspective camera with ``fov`` (rad) across the longer side."""
+    near, far = clip
+    half = np.tan(fov / 2.0)
+    sx, sy = (1.0 / half, aspect / half) if aspect >= 1.0 else (1.0 / (half * aspect), 1.0 / half)
+    projection = np.array([
+        [sx, 0, 0, 0], [0, sy, 0, 0],
+        [0, 0, -(far + near) / (far - near), -2 * far * near / (far - near)], [0, 0, -1, 0],
+    ])  # fmt: skip
+    return Camera(look_at(eye, target), projection, near, far)
+
+
+def orthographic(
+    eye: Sequence[float], target: Sequence[float], scale: float = 4.0, aspect: float = 16 / 9,
+    clip: tuple[float, float] = (0.01, 1000.0),
+) -> Camera:  # fmt: skip
+    """An orthographic camera ``scale`` m across the longer side."""
+    near, far = clip
+    w, h = (scale, scale / aspect) if aspect >= 1.0 else (scale * aspect, scale)
+    projection = np.array([
+        [2 / w, 0, 0, 0], [0, 2 / h, 0, 0], [0, 0, -2 / (far - near), -(far + near) / (far - near)], [0, 0, 0, 1],
+    ])  # fmt: skip
+    return Camera(look_at(eye, target), projection, near, far)
+
+
+def point_light(position: Sequence[float], power: float, radius: float = 0.0, color=(1.0, 1.0, 1.0)) -> Light:
+    """An isotropic light of ``power`` W."""
+    matrix = np.eye(4)
+    matrix[:3, 3] = position
+    return Light("Point", "POINT", power * np.asarray(color, "f8"), matrix, radius=radius)
+
+
+def spot_light(
+    position: Sequence[float], target: Sequence[float], power: float, size: float = 1.0, blend: float = 0.15,
+    radius: float = 0.0, color=(1.0, 1.0, 1.0),
+) -> Light:  # fmt: skip
+    """A spot of full angle ``size`` rad."""
+    return Light("Spot", "SPOT", power * np.asarray(color, "f8"), look_at(position, target), radius=radius,
+                 spot_size=size, spot_blend=blend)  # fmt: skip
+
+
+def sun_light(direction: Sequence[float], strength: float, angle: float = 0.0, color=(1.0, 1.0, 1.0)) -> Light:
+    """Parallel light travelling along ``direction``, ``strength`` W/m² on a facing surface."""
+    return Light("Sun", "SUN", strength * np.asarray(color, "f8"), look_at((0, 0, 0), direction), angle=angle)
+
+
+def area_light(
+    position: Sequence[float], target: Sequence[float], power: float, size: tuple[float, float] = (1.0, 1.0),
+    shape: str = "RECTANGLE", spread: float = np.pi, color=(1.0, 1.0, 1.0),
+) -> Light:  # fmt: skip
+    """A rectangle or ellipse of ``size`` m shining towards ``target``."""
+    return Light("Area", "AREA", power * np.asarray(color, "f8"), look_at(position, target), shape=shape, size=size,
+                 spread=spread)  # fmt: skip
+
+
+# --- geometry ---------------------------------------------------------------------------------------------------------
+
+
+def mesh_from_quads(quads: np.ndarray, name: str = "Quads") -> Mesh:
+    """Flat quads (N, 4, 3), counter-clockwise seen from their front, each with UVs over [0, 1]²."""
+    quads = np.asarray(quads, "f4").reshape(-1, 4, 3)
+    n = len(quads)
+    normal = np.cross(quads[:, 1] - quads[:, 0], quads[:, 2] - quads[:, 0])
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    normal = np.where(length > 0, normal / np.where(length > 0, length, 1.0), 0.0)
+    triangles = (np.arange(n)[:, None] * 4 + np.array([0, 1, 2, 0, 2, 3])).reshape(-1, 3)
+    uv = np.tile(np.array([[0, 0], [1, 0], [1, 1], [0, 1]], "f4"), (n, 1))
+    return Mesh(
+        name, quads.reshape(-1, 3), np.repeat(normal, 4, axis=0).astype("f4"), triangles.astype("u4"),
+        np.array([[0, 0, len(triangles)]]), {"uv:UVMap": uv}, "UVMap",
+    )  # fmt: skip
+
+
+def box_quads(low: Sequence[float], high: Sequence[float], *, inward: bool = False) -> np.ndarray:
+    """The six sides (6, 4, 3) of a box, in order −x, +x, −y, +y, −z, +z."""
+    (x0, y0, z0), (x1, y1, z1) = low, high
+    quads = np.array([
+        [[x0, y1, z0], [x0, y0, z0], [x0, y0, z1], [x0, y1, z1]],
+        [[x1, y0, z0], [x1, y1, z0], [x1, y1, z1], [x1, y0, z1]],
+        [[x0, y0, z0], [x1, y0, z0], [x1, y0, z1], [x0, y0, z1]],
+        [[x1, y1, z0], [x0, y1, z0], [x0, y1, z1], [x1, y1, z1]],
+        [[x0, y1, z0], [x1, y1, z0], [x1, y0, z0], [x0, y0, z0]],
+        [[x0, y0, z1], [x1, y0, z1], [x1, y1, z1], [x0, y1, z1]],
+    ], "f4")  # fmt: skip
+    return quads[:, ::-1] if inward else quads
+
+
+def sphere(radius: float = 1.0, segments: int = 64, rings: int = 32, *, inward: bool = False) -> Mesh:
+    """A UV sphere about the origin with smooth normals."""
+    theta = np.pi * np.arange(rings + 1) / rings
+    phi = 2.0 * np.pi * np.arange(segments + 1) / segments
+    t, p = np.meshgrid(theta, phi, indexing="ij")
+    unit = np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)], -1).reshape(-1, 3)
+    i, j = np.meshgrid(np.arange(rings), np.arange(segments), indexing="ij")
+    a = (i * (segments + 1) + j).ravel()
+    b, c, d = a + 1, a + segments + 1, a + segments + 2
+    triangles = np.concatenate([np.stack([a, c, d], -1), np.stack([a, d, b], -1)])
+    if inward:
+        triangles = triangles[:, ::-1]
+    normals = -unit if inward else unit
+    uv = np.stack([p.ravel() / (2 * np.pi), 1.0 - t.ravel() / np.pi], -1).astype("f4")
+    return Mesh("Sphere", (radius * unit).astype("f4"), normals.astype("f4"), triangles.astype("u4"),
+                np.array([[0, 0, len(triangles)]]), {"uv:UVMap": uv}, "UVMap")  # fmt: skip
+
+
+class SceneBuilder:
+    """Collects placed meshes with one material each."""
+
+    def __init__(self, name: str = "Scene") -> None:
+        self.scene = Scene(name=name, world=world())
+        self._placed: list[tuple[int, np.ndarray, int, int]] = []
+
+    def add(self, mesh: Mesh, material: Material, matrix: np.ndarray | None = None, visibility: int = 63) -> SceneBuilder:
+        """Place ``mesh`` with ``material`` at ``matrix`` (identity by default)."""
+        scene = self.scene
+        if mesh not in scene.meshes:
+            scene.meshes.append(mesh)
+        if material not in scene.materials:
+            scene.materials.append(material)
+        self._placed.append(
+            (scene.meshes.index(mesh), np.eye(4) if matrix is None else np.asarray(matrix, "f8"),
+             scene.materials.index(material), visibility)
+        )  # fmt: skip
+        return self
+
+    def quads(self, quads: np.ndarray, material: Material, visibility: int = 63) -> SceneBuilder:
+        """Add flat quads as one mesh."""
+        return self.add(mesh_from_quads(quads), material, visibility=visibility)
+
+    def light(self, light: Light) -> SceneBuilder:
+        self.scene.lights.append(light)
+        return self
+
+    def build(self, camera: Camera | None = None, world_: World | None = None) -> Scene:
+        """The Scene."""
+        scene = self.scene
+        n = len(self._placed)
+        scene.instances = Instances.make(
+            [p[0] for p in self._placed],
+            np.array([p[1] for p in self._placed]).reshape(n, 4, 4),
+            [(p[2],) for p in self._placed],
+            visibility=[p[3] for p in self._placed],
+        )
+        scene.camera = camera
+        if world_ is not None:
+            scene.world = world_
+        return scene
+
+
+def _turned(quads: np.ndarray, degrees: float, center: Sequence[float]) -> np.ndarray:
+    a = np.radians(degrees)
+    r = np.array([[np.cos(a), -np.sin(a), 0], [np.sin(a), np.cos(a), 0], [0, 0, 1]])
+    return (quads - center) @ r.T + center
+
+
+# --- scenes -----------------------------------------------------------------------------------------------------------
+
+
+def cornell(*, blocks: bool = True, light: str = "spot", power: float = 60.0, aspect: float = 16 / 9) -> Scene:
+    """A Cornell box 2 m wide, open towards the camera at −y; ``light``: spot (from above, downwards), point, area, sun.
+
+    The walls' backs face outwards, so that the camera's side is the only opening.
+    """
+    b = SceneBuilder(f"cornell-{light}{'' if blocks else '-empty'}")
+    sides = box_quads((-1, -1, 0), (1, 1, 2), inward=True)
+    white, red, green = diffuse(WHITE, "White"), diffuse(RED, "Red"), diffuse(GREEN, "Green")
+    b.quads(sides[[3, 4, 5]], white)
+    b.quads(sides[[0]], red)
+    b.quads(sides[[1]], green)
+    if blocks:
+        tall = _turned(box_quads((-0.62, 0.05, 0.0), (-0.02, 0.65, 1.2)), 17.0, (-0.32, 0.35, 0.0))
+        low = _turned(box_quads((0.05, -0.6, 0.0), (0.65, 0.0, 0.6)), -16.0, (0.35, -0.3, 0.0))
+        b.quads(tall[[0, 1, 2, 3, 5]], white)
+        b.quads(low[[0, 1, 2, 3, 5]], white)
+    b.light({
+        "spot": lambda: spot_light((0, 0, 1.98), (0, 0, 0), power, size=np.radians(100.0), blend=0.3),
+        "point": lambda: point_light((0, 0, 1.6), power),
+        "area": lambda: area_light((0, 0, 1.99), (0, 0, 0), power, (0.5, 0.5)),
+        "sun": lambda: sun_light((0.25, 0.8, -0.9), power / 10.0),
+    }[light]())  # fmt: skip
+    return b.build(perspective((0, -4.2, 1.0), (0, 0, 1.0), 0.85, aspect))
+
+
+def integrating_sphere(
+    *, radius: float = 1.0, albedo: float = 0.5, power: float = 100.0, light: Sequence[float] = (0.0, 0.0, 0.0),
+    segments: int = 96,
+) -> Scene:  # fmt: skip
+    """Stability test 1: inside a diffuse sphere one bounce of any light is ρΦ/(4πR²) everywhere."""
+    b = SceneBuilder("integrating-sphere")
+    b.add(sphere(radius, segments, segments // 2, inward=True), diffuse((albedo,) * 3))
+    position = radius * np.asarray(light, "f8")
+    b.light(point_light(position, power))
+    return b.build(perspective((0.0, -0.5 * radius, 0.1 * radius), (0.0, radius, 0.0), 1.9,
+                               clip=(1e-3 * radius, 10 * radius)))  # fmt: skip
+
+
+def two_patches(*, distance: float = 1.0, size: float = 0.5, albedo: float = 0.6) -> Scene:
+    """A lit square patch facing an unlit receiver point above it: the form factor of parallel squares.
+
+    A narrow spot lights only the sender from between the two; the receiver is a small patch seen by the camera.
+    """
+    b = SceneBuilder("two-patches")
+    h = size / 2.0
+    sender = [[-h, -h, 0], [h, -h, 0], [h, h, 0], [-h, h, 0]]
+    b.quads(np.array([sender]), diffuse((albedo,) * 3, "Sender"))
+    r = 0.02 * size
+    receiver = [[-r, r, distance], [r, r, distance], [r, -r, distance], [-r, -r, distance]]
+    b.quads(np.array([receiver]), diffuse((1.0,) * 3, "Receiver"))
+    b.light(sun_light((0.0, 0.9, -1.0), 10.0))
+    return b.build(perspective((0.0, -0.6 * distance, 0.35 * distance), (0, 0, distance), 0.12, clip=(1e-3, 100.0)))
+
+
+def plane_scene(light: Light, *, size: float = 8.0, material: Material | None = None) -> Scene:
+    """A plane under one light, nothing to bounce: what direct light is compared with Cycles on."""
+    b = SceneBuilder(f"plane-{light.kind.lower()}")
+    h = size / 2.0
+    b.quads(np.array([[[-h, -h, 0], [h, -h, 0], [h, h, 0], [-h, h, 0]]]), material or diffuse((0.8,) * 3))
+    b.light(light)
+    return b.build(perspective((0, -7, 4), (0, 0, 0), 0.9))
+
+
+__all__ = [name for name in globals() if not name.startswith("_") and name not in ("annotations", "CAMERA", "np")]

@@ -1,0 +1,40 @@
+// Irradiance from virtual point lights. Included where `vpls` is declared.
+//
+// A Lambertian patch of flux Φ gives E = Φ/π · cosθ_p cosθ_x / d² (design.md §4; Dachsbacher and Stamminger 2005, eq. 1,
+// with the 1/π they leave to the scale). Taken as a disc of its own area A, with K = cosθ_p cosθ_x / (π d²) its form
+// factor is not K A but K A / (1 + K A): exact for a disc facing a point on its axis, A/(π d² + A), never above 1, and
+// with both cosines in it, so that patches seen edge-on — a sphere's inside, a corner — lose no light to the bound.
+
+#include "lib/math_lib.glsl"
+
+struct Gathered {
+    vec3 radiance;    // E/π: what a white Lambert surface reflects, W/(m²·sr)
+    vec4 direction;   // Σ luminance × direction to the source; Σ luminance
+};
+
+Gathered gather_vpls(vec3 position_ws, vec3 n, vec3 ng)
+{
+    Gathered g = Gathered(vec3(0.0), vec4(0.0));
+    for (int i = 0; i < vpl_count; ++i) {
+        Vpl vpl = vpls[i];
+        vec3 d = vpl.position_ws - position_ws;
+        float d2 = dot(d, d);
+        float inverse = inversesqrt(max(d2, 1e-37));
+        vec3 w = d * inverse;
+        float cos_p = -dot(w, vpl.normal_ws);
+        float cos_g = dot(w, ng);
+        if (cos_p <= 0.0 || cos_g <= 0.0) {
+            continue;
+        }
+        float cos_x = max(dot(w, n), 0.0);
+        // Φ/A · K A/(1 + K A) without the area: Φ cos cos / (π d² + cos cos A).
+        float product = cos_p * cos_x;
+        float kernel = product / (PI * d2 + product * vpl.area);
+        g.radiance += vpl.flux * kernel;
+        // Light per direction, by the same bound but for the receiver's own cosine.
+        float arriving = luminance(vpl.flux) * cos_p / (PI * d2 + cos_p * vpl.area);
+        g.direction += vec4(w, 1.0) * arriving;
+    }
+    g.radiance *= INV_PI;
+    return g;
+}

@@ -1,0 +1,43 @@
+// RSM texels as virtual point lights. Included where rsm_depth, rsm_normal, rsm_albedo, rsm_lights and rsm_views are
+// declared.
+
+#include "lib/light_lib.glsl"
+
+struct RsmTexel {
+    vec3 position_ws;
+    vec3 normal_ws;    // of the triangle, towards the light
+    vec3 flux;         // reflected, W
+    float area;        // of the surface that the texel shows, m²
+};
+
+// The grazing limit of a texel's surface: beyond it the plane would leave the texel's neighbours too (cos 88.9°).
+const float GRAZING_COS = 0.02;
+
+// What texel `pixel` of view `index` reflects. A surface of area A under the beam's cross-section B at angle θ has
+// A = B / cosθ; shading normals take irradiance by their own cosine, so Φ = albedo · E · cos θ_shading · A. A flat-shaded
+// surface gives Φ = albedo × the arriving flux.
+RsmTexel rsm_texel(int index, ivec2 pixel)
+{
+    LightView v = rsm_views[index];
+    Light light = rsm_lights[v.light];
+    RsmTexel t = RsmTexel(vec3(0.0), vec3(0.0, 0.0, 1.0), vec3(0.0), 0.0);
+    vec4 albedo = texelFetch(rsm_albedo, pixel, 0);
+    if (albedo.a <= 0.0) {
+        return t;
+    }
+    float depth = texelFetch(rsm_depth, pixel, 0).r;
+    vec2 texel = vec2(2.0 / v.rect.z, 2.0 / v.rect.w);
+    vec2 xy = (vec2(pixel) + 0.5 - v.rect.xy) * texel - 1.0;
+    float beam;
+    vec3 arriving = light_view_flux(v, light, xy, texel, depth, beam);
+    vec4 normals = texelFetch(rsm_normal, pixel, 0);
+    vec3 n = octahedral_decode(normals.xy);
+    t.position_ws = light_view_position(v, xy, depth);
+    t.normal_ws = octahedral_decode(normals.zw);
+    vec3 to_light = v.perspective > 0.5 ? normalize(v.origin_ws - t.position_ws) : -v.axis_z;
+    float cos_g = max(dot(t.normal_ws, to_light), GRAZING_COS);
+    float cos_s = max(dot(n, to_light), 0.0);
+    t.area = beam / cos_g;
+    t.flux = arriving * albedo.rgb * (cos_s / cos_g);
+    return t;
+}

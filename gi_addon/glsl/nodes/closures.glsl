@@ -1,0 +1,144 @@
+// The closures of Blender's nodes. Layering follows Cycles: what a layer reflects (its directional albedo) is taken from
+// the layers below it. SURFACE_TABLES says how that is found: 1 for this view, 2 as the mean over views (a bounce goes to
+// all sides), 0 without tables, as if smooth (shadow maps, which only ask what passes).
+
+#include "lib/surface_lib.glsl"
+
+float surface_albedo_curve(SurfacePoint point, vec3 n, float roughness, float eta)
+{
+#if SURFACE_TABLES == 2
+    return albedo_curve_average(brdf_average, roughness, eta);
+#elif SURFACE_TABLES == 1
+    return albedo_curve(brdf_albedo, roughness, saturate(abs(dot(n, point.view_ws))), eta);
+#else
+    return fresnel_curve(saturate(abs(dot(n, point.view_ws))), eta);
+#endif
+}
+
+Closure principled_closure(vec3 base, float metallic, float roughness, float ior, float level, vec3 tint, vec3 n,
+                           float multiscatter, SurfacePoint point)
+{
+    metallic = saturate(metallic);
+    roughness = saturate(roughness);
+    ior = max(ior, 1e-5);
+    level = max(level, 0.0);
+    vec3 metal_f0 = saturate(base);
+
+    // "Specular IOR Level" scales F0; ½ leaves the index alone.
+    float f0 = f0_from_ior(ior);
+    float eta = ior;
+    if (level != 0.5) {
+        f0 *= 2.0 * level;
+        eta = ior_from_f0(f0);
+    } else if (eta < 1.0) {
+        eta = 1.0 / eta; // seen from outside a thinner medium: same F0, no total reflection in the table
+    }
+    vec3 layer_f0 = saturate(f0 * max(tint, vec3(0.0)));
+    bool has_layer = eta > 1.0;
+    vec3 layer_albedo =
+        has_layer ? mix(layer_f0, vec3(1.0), surface_albedo_curve(point, n, roughness, eta)) : vec3(0.0);
+
+    Closure c = closure_none();
+    c.diffuse = max(base, vec3(0.0)) * ((1.0 - metallic) * saturate(1.0 - max3(layer_albedo)));
+    float dielectric = has_layer ? 1.0 - metallic : 0.0;
+    c.f0 = metal_f0 * metallic + layer_f0 * dielectric;
+    c.gloss = metallic + dielectric;
+    c.f90 = vec3(c.gloss);
+    c.roughness = roughness * c.gloss;
+    c.eta = (metallic > dielectric ? ETA_SCHLICK : eta) * c.gloss;
+    c.multiscatter = multiscatter * c.gloss;
+    c.normal_ws = n;
+    return c;
+}
+
+// Glass of the principled BSDF: Fresnel splits between the glossy lobe and what is refracted, tinted √base per surface.
+void principled_transmission(inout Closure c, vec3 base, float metallic, float roughness, float ior, vec3 tint,
+                             float weight, vec3 n, float multiscatter, SurfacePoint point)
+{
+    weight = saturate(weight) * (1.0 - saturate(metallic));
+    ior = max(ior, 1e-5);
+    float eta = ior < 1.0 ? 1.0 / ior : ior;
+    vec3 f0 = saturate(f0_from_ior(ior) * max(tint, vec3(0.0)));
+    vec3 reflected = eta > 1.0 ? mix(f0, vec3(1.0), surface_albedo_curve(point, n, saturate(roughness), eta)) : vec3(0.0);
+    // The opaque dielectric gives way; its specular layer already is the reflection.
+    float share = 1.0 - saturate(metallic) > 0.0 ? weight / (1.0 - saturate(metallic)) : 0.0;
+    c.diffuse *= 1.0 - share;
+    c.transmission += sqrt(saturate(base)) * (vec3(1.0) - reflected) * weight;
+    float amount = luminance(c.transmission);
+    c.transmission_roughness = saturate(roughness) * amount;
+    c.transmission_eta = ior * amount;
+}
+
+void principled_subsurface(inout Closure c, float weight, vec3 radius)
+{
+    c.subsurface = c.diffuse * saturate(weight);
+    c.subsurface_radius = max(radius, vec3(0.0)) * luminance(c.subsurface);
+}
+
+// A clear layer on top: it takes its albedo from all below and adds a lobe of its own, merged into the glossy one.
+void principled_coat(inout Closure c, float weight, float roughness, float ior, vec3 tint, SurfacePoint point)
+{
+    weight = saturate(weight);
+    float eta = max(ior, 1.0);
+    float f0 = f0_from_ior(eta);
+    vec3 n = point.normal_ws;
+    float albedo = eta > 1.0 ? weight * mix(f0, 1.0, surface_albedo_curve(point, n, saturate(roughness), eta)) : 0.0;
+    // The tint is what passes the coat at normal incidence; the way through lengthens with the refracted angle.
+    float cos_i = saturate(abs(dot(point.view_ws, n)));
+    float cos_t = sqrt(1.0 - (1.0 - cos_i * cos_i) / (eta * eta));
+    vec3 passed = mix(vec3(1.0), pow(max(tint, vec3(1e-6)), vec3(1.0 / cos_t)), weight) * (1.0 - albedo);
+    vec3 normal_ws = c.normal_ws;
+    c.diffuse *= passed;
+    c.subsurface *= passed;
+    c.f0 *= passed;
+    c.f90 *= passed;
+    c.emission *= passed;
+    c.transmission *= passed;
+    float keep = c.gloss * luminance(passed);
+    c.roughness *= luminance(passed);
+    c.eta *= luminance(passed);
+    c.multiscatter *= luminance(passed);
+    c.f0 += vec3(f0 * weight);
+    c.f90 += vec3(weight);
+    c.gloss = keep + weight;
+    c.roughness += saturate(roughness) * weight;
+    c.eta += eta * weight;
+    c.normal_ws = normal_ws;
+}
+
+Closure closure_glass(vec3 color, float roughness, float ior, vec3 n, SurfacePoint point)
+{
+    float eta = max(ior, 1e-5);
+    eta = eta < 1.0 ? 1.0 / eta : eta;
+    float f0 = f0_from_ior(eta);
+    float albedo = mix(f0, 1.0, surface_albedo_curve(point, n, saturate(roughness), eta));
+    Closure c = closure_refraction(max(color, vec3(0.0)) * (1.0 - albedo), roughness, ior, n);
+    c.f0 = max(color, vec3(0.0)) * f0;
+    c.f90 = max(color, vec3(0.0));
+    c.gloss = 1.0;
+    c.roughness = saturate(roughness);
+    c.eta = eta;
+    c.normal_ws = n;
+    return c;
+}
+
+float node_fresnel(float ior, vec3 n, SurfacePoint point)
+{
+    float eta = max(ior, 1e-5);
+    return fresnel_dielectric(dot(point.view_ws, n), point.backfacing > 0.5 ? 1.0 / eta : eta);
+}
+
+// (Fresnel, Facing) of Blender's Layer Weight.
+vec3 node_layer_weight(float blend, vec3 n, SurfacePoint point)
+{
+    float eta = max(1.0 - blend, 1e-5);
+    float cos_i = dot(point.view_ws, n);
+    float f = fresnel_dielectric(cos_i, point.backfacing > 0.5 ? eta : 1.0 / eta);
+    float facing = abs(cos_i);
+    if (blend != 0.5) {
+        blend = clamp(blend, 0.0, 0.99999);
+        blend = blend < 0.5 ? 2.0 * blend : 0.5 / (1.0 - blend);
+        facing = pow(facing, blend);
+    }
+    return vec3(f, 1.0 - facing, 0.0);
+}

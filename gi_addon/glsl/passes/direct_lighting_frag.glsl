@@ -1,0 +1,74 @@
+// Direct light: Lambert and GGX (lib/bsdf_lib.glsl) under every light's point of this sub-frame, through its shadow map.
+//
+// direct_diffuse is E/π, W/(m²·sr): Cycles' Diffuse Direct, without the surface's colour.
+// direct_glossy is ∫ L f cosθ dω of the glossy lobe, with its colour. A light's point stands for a patch of its source;
+// the lobe is widened by that patch, so that highlights of large lights are smooth at any number of sub-frames.
+
+#include "lib/view_lib.glsl"
+#include "lib/bsdf_lib.glsl"
+#include "lib/shadow_lib.glsl"
+
+// GGX alpha after convolution with a uniform disc of angular radius θ: the half vector turns half as far as the light,
+// whose variance per axis is θ²/4, so slopes gain θ²/16; α² is twice the slopes' variance (Beckmann's relation).
+float widened_alpha(float alpha, float angle) { return min(sqrt(alpha * alpha + angle * angle / 8.0), 1.0); }
+
+void main()
+{
+    ivec2 pixel = ivec2(gl_FragCoord.xy);
+    vec2 uv = gl_FragCoord.xy * view.inverse_resolution;
+    float depth = texelFetch(gbuf_depth, pixel, 0).r;
+    vec3 diffuse = vec3(0.0);
+    vec3 glossy = vec3(0.0);
+    vec3 open_light = vec3(0.0);
+    vec3 lit_light = vec3(0.0);
+    if (depth > 0.0) {
+        vec3 position_ws = position_ws_from_depth(uv, depth);
+        vec4 normals = texelFetch(gbuf_normal, pixel, 0);
+        vec3 n = octahedral_decode(normals.xy);
+        vec3 ng = octahedral_decode(normals.zw);
+        vec3 v = view_direction_ws(uv);
+#if HAS_DIRECT_GLOSSY
+        vec4 specular = texelFetch(gbuf_specular, pixel, 0);
+        vec4 packed_lobe = texelFetch(gbuf_lobe, pixel, 0);
+        Lobe lobe = Lobe(specular.rgb, packed_lobe.g, specular.a, packed_lobe.r, packed_lobe.b);
+        float alpha = max(sqr(lobe.roughness), ALPHA_MIN);
+        bool has_lobe = max3(lobe.f0) > 0.0 || lobe.f90 > 0.0;
+        vec3 gain = has_lobe ? multiscatter_gain(brdf_energy, brdf_average, lobe, saturate(abs(dot(n, v)))) : vec3(0.0);
+#endif
+        for (int i = 0; i < light_count; ++i) {
+            Light light = lights[i];
+            vec3 l;
+            float angle;
+            vec3 arriving = light_arriving(light, position_ws, l, angle);
+            float cos_l = dot(n, l);
+            // Light from behind the triangle does not reach its front, whatever the shading normal says.
+            if (cos_l <= 0.0 || dot(ng, l) <= 0.0 || max3(arriving) <= 0.0) {
+                continue;
+            }
+            float visible = 1.0;
+#if HAS_SHADOW_DEPTH
+            visible = light_visibility(shadow_depth, light, position_ws, ng, softness, filter_turn);
+#endif
+            vec3 irradiance = arriving * cos_l;
+            open_light += irradiance;
+            lit_light += irradiance * visible;
+#if HAS_DIRECT_GLOSSY
+            if (has_lobe && visible > 0.0) {
+                glossy += arriving * visible * gain * ggx_eval(lobe, widened_alpha(alpha, angle), n, v, l);
+            }
+#endif
+        }
+        diffuse = lit_light * INV_PI;
+    }
+#if HAS_DIRECT_DIFFUSE
+    direct_diffuse = vec4(diffuse, 1.0);
+#endif
+#if HAS_DIRECT_GLOSSY
+    direct_glossy = vec4(glossy, 1.0);
+#endif
+#if HAS_DIRECT_SHADOW
+    float open_luminance = luminance(open_light);
+    vec3 share = open_luminance > 0.0 ? lit_light / max(open_light, vec3(1e-6 * open_luminance)) : vec3(1.0);
+    direct_shadow = vec4(depth > 0.0 ? share : vec3(1.0), 1.0);
+#endif
+}

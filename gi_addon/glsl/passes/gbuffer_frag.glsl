@@ -1,0 +1,46 @@
+// G-buffer: what the camera sees in this sub-frame.
+//
+// Where a surface covers a pixel in part (alpha) it is there in that share of the sub-frames; its lobes are then its own,
+// not faded. Paper §IV-B keeps view-space position and normal, material and depth; here the position is the view depth
+// (32 bit) on the pixel's ray, and normals are in world space.
+
+#include "surface/surface_point.glsl"
+
+void main()
+{
+    float depth = view_depth(vary_position_ws);
+    vec2 uv = gl_FragCoord.xy * view.inverse_resolution;
+    if (depth < view.clip_start || depth > view.clip_end) {
+        discard;
+    }
+    SurfacePoint p = surface_point(view_direction_ws(uv));
+    Closure c = surface_closure(p);
+    float opacity = surface_opacity(c);
+#if SURFACE_TRANSPARENT
+    if (!surface_is_there(opacity, 0u)) {
+        discard;
+    }
+#endif
+    float gain = opacity > 0.0 ? 1.0 / opacity : 1.0;
+    vec3 n = safe_normalize(c.normal_ws);
+    if (dot(n, n) < 0.5) {
+        n = p.normal_ws;
+    }
+    gbuf_depth = depth;
+#if HAS_GBUF_NORMAL
+    gbuf_normal = vec4(octahedral_encode(n), octahedral_encode(p.geometric_normal_ws));
+#endif
+#if HAS_GBUF_DIFFUSE
+    gbuf_diffuse = vec4(c.diffuse * gain, 1.0);
+#endif
+    Lobe lobe = closure_lobe(c);
+#if HAS_GBUF_SPECULAR
+    gbuf_specular = vec4(lobe.f0 * gain, lobe.roughness);
+#endif
+#if HAS_GBUF_LOBE
+    gbuf_lobe = vec4(lobe.eta, lobe.f90 * gain, lobe.multiscatter, 0.0);
+#endif
+#if HAS_GBUF_EMISSION
+    gbuf_emission = vec4(c.emission * gain, 1.0);
+#endif
+}

@@ -1,0 +1,142 @@
+// The film: what each pass of the picture adds in this sub-frame.
+//
+// Light passes hold light × colour; the colours have layers of their own and the division comes at the end
+// (gi_addon/outputs.py). Combined is the sum of all of them by construction.
+
+#include "lib/view_lib.glsl"
+#include "lib/bsdf_lib.glsl"
+#include "generated/world.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+
+void add(int layer, ivec2 pixel, vec4 value)
+{
+    ivec3 at = ivec3(pixel, layer);
+    // A number that is not one would stay in the film for good. Nothing upstream should make one; the non-finite scan of
+    // the stability suite reads the passes before this point.
+    value = mix(value, vec4(0.0), bvec4(!is_finite(value.x), !is_finite(value.y), !is_finite(value.z), !is_finite(value.w)));
+    imageStore(film, at, first_subframe == 1 ? value : imageLoad(film, at) + value);
+}
+
+void main()
+{
+    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    if (any(greaterThanEqual(pixel, imageSize(film).xy))) {
+        return;
+    }
+    vec2 uv = (vec2(pixel) + 0.5) * view.inverse_resolution;
+    float depth = 0.0;
+#if HAS_GBUF_DEPTH
+    depth = texelFetch(gbuf_depth, pixel, 0).r;
+#endif
+    bool surface = depth > 0.0;
+
+    vec3 diffuse_color = vec3(0.0);
+    vec3 diffuse_direct = vec3(0.0);
+    vec3 diffuse_indirect = vec3(0.0);
+    vec3 glossy_direct = vec3(0.0);
+    vec3 glossy_indirect = vec3(0.0);
+    vec3 emission = vec3(0.0);
+    vec3 environment = vec3(0.0);
+
+    if (surface) {
+#if HAS_GBUF_DIFFUSE
+        diffuse_color = texelFetch(gbuf_diffuse, pixel, 0).rgb;
+#endif
+#if HAS_DIRECT_DIFFUSE
+        diffuse_direct = texelFetch(direct_diffuse, pixel, 0).rgb * diffuse_color;
+#endif
+#if HAS_INDIRECT_DIFFUSE
+        diffuse_indirect = texelFetch(indirect_diffuse, pixel, 0).rgb * diffuse_color;
+#endif
+#if HAS_DIRECT_GLOSSY
+        glossy_direct = texelFetch(direct_glossy, pixel, 0).rgb;
+#endif
+#if HAS_GBUF_EMISSION
+        emission = texelFetch(gbuf_emission, pixel, 0).rgb;
+#endif
+    } else if (view.film_transparent < 0.5) {
+        environment = world_radiance(normalize(ray_direction_ws(uv)));
+    }
+
+#if LAYER_COMBINED >= 0
+    float alpha = surface || view.film_transparent < 0.5 ? 1.0 : 0.0;
+    add(LAYER_COMBINED, pixel, vec4(diffuse_direct + diffuse_indirect + glossy_direct + glossy_indirect + emission +
+                                    environment, alpha));
+#endif
+#if LAYER_DEPTH >= 0
+    // The first sub-frame's depth, as Cycles keeps its first sample's: a mean of depths is no depth. Nothing is 1e10.
+    if (first_subframe == 1) {
+        imageStore(film, ivec3(pixel, LAYER_DEPTH), vec4(surface ? depth : 1e10));
+    }
+#endif
+#if LAYER_NORMAL >= 0
+    vec3 normal_ws = vec3(0.0);
+#if HAS_GBUF_NORMAL
+    if (surface) {
+        normal_ws = octahedral_decode(texelFetch(gbuf_normal, pixel, 0).xy);
+    }
+#endif
+    add(LAYER_NORMAL, pixel, vec4(normal_ws, 1.0));
+#endif
+#if LAYER_DIFFUSE_DIRECT >= 0
+    add(LAYER_DIFFUSE_DIRECT, pixel, vec4(diffuse_direct, 1.0));
+#endif
+#if LAYER_DIFFUSE_INDIRECT >= 0
+    add(LAYER_DIFFUSE_INDIRECT, pixel, vec4(diffuse_indirect, 1.0));
+#endif
+#if LAYER_DIFFUSE_COLOR >= 0
+    add(LAYER_DIFFUSE_COLOR, pixel, vec4(diffuse_color, 1.0));
+#endif
+#if LAYER_GLOSSY_DIRECT >= 0
+    add(LAYER_GLOSSY_DIRECT, pixel, vec4(glossy_direct, 1.0));
+#endif
+#if LAYER_GLOSSY_INDIRECT >= 0
+    add(LAYER_GLOSSY_INDIRECT, pixel, vec4(glossy_indirect, 1.0));
+#endif
+#if LAYER_GLOSSY_COLOR >= 0
+    vec3 glossy_color = vec3(0.0);
+#if HAS_GBUF_SPECULAR && HAS_GBUF_LOBE && HAS_BRDF_ALBEDO
+    if (surface) {
+        vec4 specular = texelFetch(gbuf_specular, pixel, 0);
+        vec4 packed_lobe = texelFetch(gbuf_lobe, pixel, 0);
+        Lobe lobe = Lobe(specular.rgb, packed_lobe.g, specular.a, packed_lobe.r, packed_lobe.b);
+        vec3 n = octahedral_decode(texelFetch(gbuf_normal, pixel, 0).xy);
+        glossy_color = lobe_albedo(brdf_albedo, lobe, saturate(abs(dot(n, view_direction_ws(uv)))));
+    }
+#endif
+    add(LAYER_GLOSSY_COLOR, pixel, vec4(glossy_color, 1.0));
+#endif
+#if LAYER_TRANSMISSION_DIRECT >= 0
+    add(LAYER_TRANSMISSION_DIRECT, pixel, vec4(0.0));
+#endif
+#if LAYER_TRANSMISSION_INDIRECT >= 0
+    add(LAYER_TRANSMISSION_INDIRECT, pixel, vec4(0.0));
+#endif
+#if LAYER_TRANSMISSION_COLOR >= 0
+    add(LAYER_TRANSMISSION_COLOR, pixel, vec4(0.0));
+#endif
+#if LAYER_VOLUME_DIRECT >= 0
+    add(LAYER_VOLUME_DIRECT, pixel, vec4(0.0));
+#endif
+#if LAYER_EMISSION >= 0
+    add(LAYER_EMISSION, pixel, vec4(emission, 1.0));
+#endif
+#if LAYER_ENVIRONMENT >= 0
+    add(LAYER_ENVIRONMENT, pixel, vec4(environment, 1.0));
+#endif
+#if LAYER_AO >= 0
+    float occlusion = 0.0;
+#if HAS_AO
+    occlusion = texelFetch(ao, pixel, 0).r;
+#endif
+    add(LAYER_AO, pixel, vec4(vec3(occlusion), 1.0));
+#endif
+#if LAYER_SHADOW >= 0
+    vec3 shadow = vec3(surface ? 0.0 : 1.0);
+#if HAS_DIRECT_SHADOW
+    shadow = texelFetch(direct_shadow, pixel, 0).rgb;
+#endif
+    add(LAYER_SHADOW, pixel, vec4(shadow, 1.0));
+#endif
+}

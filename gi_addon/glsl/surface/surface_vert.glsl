@@ -1,0 +1,90 @@
+// Vertices of the scene's meshes for any view: camera, light map, voxels. One instance per draw of a mesh, its transform
+// in instance attributes, so that one indirect call draws any number of objects.
+
+in vec3 in_position;
+in vec3 instance_row_0; // rows of world_from_object
+in vec3 instance_row_1;
+in vec3 instance_row_2;
+in vec3 instance_translation;
+
+uniform mat4 clip_from_world;
+
+#if SURFACE_FULL
+in ivec4 in_normal; // unit vector × 32767
+out vec3 vary_position_ws;
+out vec3 vary_normal_ws;
+#if SURFACE_OBJECT_SPACE
+in vec3 instance_texspace_min;
+in vec3 instance_texspace_scale;
+in vec4 instance_color;
+in vec2 instance_info; // object index, random
+out vec3 vary_position_os;
+out vec3 vary_normal_os;
+out vec3 vary_generated;
+flat out vec4 vary_color;
+flat out vec2 vary_info;
+flat out vec3 vary_location;
+flat out mat3 vary_world_from_object_normal;
+#endif
+#if SURFACE_ATTRIBUTES > 0
+in vec4 in_attribute_0;
+out vec4 vary_attribute_0;
+#endif
+#if SURFACE_ATTRIBUTES > 1
+in vec4 in_attribute_1;
+out vec4 vary_attribute_1;
+#endif
+#if SURFACE_ATTRIBUTES > 2
+in vec4 in_attribute_2;
+out vec4 vary_attribute_2;
+#endif
+#if SURFACE_ATTRIBUTES > 3
+in vec4 in_attribute_3;
+out vec4 vary_attribute_3;
+#endif
+#else
+#if SURFACE_DEPTH
+out vec3 vary_position_ws;
+#endif
+#endif
+
+void main()
+{
+    mat3 m = transpose(mat3(instance_row_0, instance_row_1, instance_row_2));
+    vec3 position_ws = m * in_position + instance_translation;
+    gl_Position = clip_from_world * vec4(position_ws, 1.0);
+#if SURFACE_FULL
+    vary_position_ws = position_ws;
+    // The cofactor matrix turns normals under any scale; its determinant's sign keeps them on their side in a mirror.
+    mat3 cofactor = mat3(cross(m[1], m[2]), cross(m[2], m[0]), cross(m[0], m[1]));
+    float mirrored = dot(m[0], cofactor[0]) < 0.0 ? -1.0 : 1.0;
+    // Cofactors shrink with the square of the scale: bring them near 1 before they are normalised.
+    float size = max(max(dot(cofactor[0], cofactor[0]), dot(cofactor[1], cofactor[1])), dot(cofactor[2], cofactor[2]));
+    cofactor *= size > 0.0 ? mirrored * inversesqrt(size) : 0.0;
+    vec3 normal_os = vec3(in_normal.xyz) * (1.0 / 32767.0);
+    vary_normal_ws = cofactor * normal_os;
+#if SURFACE_OBJECT_SPACE
+    vary_position_os = in_position;
+    vary_normal_os = normal_os;
+    vary_generated = (in_position - instance_texspace_min) * instance_texspace_scale;
+    vary_color = instance_color;
+    vary_info = instance_info;
+    vary_location = instance_translation;
+    vary_world_from_object_normal = cofactor;
+#endif
+#if SURFACE_ATTRIBUTES > 0
+    vary_attribute_0 = in_attribute_0;
+#endif
+#if SURFACE_ATTRIBUTES > 1
+    vary_attribute_1 = in_attribute_1;
+#endif
+#if SURFACE_ATTRIBUTES > 2
+    vary_attribute_2 = in_attribute_2;
+#endif
+#if SURFACE_ATTRIBUTES > 3
+    vary_attribute_3 = in_attribute_3;
+#endif
+#elif SURFACE_DEPTH
+    vary_position_ws = position_ws;
+#endif
+}

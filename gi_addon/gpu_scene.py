@@ -1,0 +1,436 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A Scene in GPU memory, and the draws of its surfaces.
+
+All meshes share one vertex and one index buffer and all instances one instance buffer, so that a pass draws each
+material with one indirect call, however many objects wear it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+
+from .gl import GL
+from .graph import Planned
+from .gpu_types import GENERATED
+from .materials import CompiledGraph, compile_surface, compile_world
+from .scene import Image, Material, Mesh, Scene, ShaderGraph
+
+# One instance's attributes, in the order of the vertex shader's inputs.
+_INSTANCE = np.dtype([
+    ("row_0", "f4", 3), ("row_1", "f4", 3), ("row_2", "f4", 3), ("translation", "f4", 3),
+    ("texspace_min", "f4", 3), ("texspace_scale", "f4", 3), ("color", "f4", 4), ("info", "f4", 2),
+])  # fmt: skip
+_INSTANCE_FORMAT = "3f 3f 3f 3f 3f 3f 4f 2f/i"
+_INSTANCE_NAMES = tuple(f"instance_{name}" for name in _INSTANCE.names)
+
+_PARAMS_BINDING = 7
+_MAX_ATTRIBUTES = 4
+_ANISOTROPY = 8.0
+
+
+@dataclass
+class Batch:
+    """Draws of one material (or of all opaque ones, ``material`` −1): ``count`` commands from ``first``."""
+
+    material: int
+    first: int
+    count: int
+
+
+class MaterialSet:
+    """Compiled materials and their parameters in one buffer. Compilation is cached by material."""
+
+    def __init__(self) -> None:
+        self._cache: dict[int, CompiledGraph] = {}
+
+    def compile(self, materials: list[Material]) -> list[CompiledGraph]:
+        """Compile what is new, forget what is gone."""
+        self._cache = {m.uid: self._cache.get(m.uid) or compile_surface(m.graph) for m in materials}
+        return [self._cache[m.uid] for m in materials]
+
+
+class GPUScene:
+    """Uploads what changed of a scene and draws it. Lives on the GL thread."""
+
+    def __init__(self, gl: GL) -> None:
+        self.gl = gl
+        self.materials = MaterialSet()
+        self.compiled: list[CompiledGraph] = []
+        self._mesh_key: tuple | None = None
+        self._transform_key: tuple | None = None
+        self._material_key: tuple | None = None
+        self._world_key: int | None = None
+        self.world: CompiledGraph = compile_world(ShaderGraph())
+        self._buffers: dict[str, moderngl.Buffer] = {}
+        self._streams: dict[str, moderngl.Buffer] = {}
+        self._textures: dict[int, moderngl.Texture] = {}
+        self._samplers: dict[tuple, moderngl.Sampler] = {}
+        self._vaos: dict[tuple, moderngl.VertexArray] = {}
+        self._draws: dict[tuple, tuple[moderngl.Buffer, list[Batch]]] = {}
+        self._scene: Scene | None = None
+        self.uploads: dict[str, int] = {}
+
+    # -- upload --------------------------------------------------------------------------------------------------
+
+    def sync(self, scene: Scene, stamps: dict[str, str]) -> None:
+        """Make the GPU's copy equal ``scene``; only what its stamps say has changed is sent."""
+        self._scene = scene
+        self.uploads = {}
+        material_key = (stamps["materials"],)
+        if material_key != self._material_key:
+            self.compiled = self.materials.compile(scene.materials)
+            self._upload_params()
+            self._material_key = material_key
+            self._vaos.clear()
+            self._draws.clear()
+            self.uploads["materials"] = len(self.compiled)
+        if self._world_key != scene.world.uid:
+            self.world = compile_world(scene.world.graph)
+            self._world_key = scene.world.uid
+            self._buffer("world_params", np.array(self.world.params or [0.0], "f4"))
+        self._sync_textures(scene)
+        wanted = sorted({name for c in self.compiled for name in c.attributes[:_MAX_ATTRIBUTES]})
+        mesh_key = (stamps["meshes"], tuple(wanted))
+        if mesh_key != self._mesh_key:
+            self._upload_meshes(scene, wanted)
+            self._mesh_key = mesh_key
+            self._transform_key = None
+            self.uploads["meshes"] = len(scene.meshes)
+        transform_key = (stamps["transforms"],)
+        if transform_key != self._transform_key:
+            self._upload_instances(scene)
+            self._transform_key = transform_key
+            self.uploads["transforms"] = len(scene.instances)
+
+    def _buffer(self, name: str, data: np.ndarray) -> moderngl.Buffer:
+        """(Re)fill a named buffer, keeping the GL object where the size allows."""
+        old = self._buffers.get(name)
+        if old is not None and old.size == max(16, data.nbytes):
+            if data.nbytes:
+                old.write(np.ascontiguousarray(data))
+            return old
+        self.gl.release(old)
+        self._vaos.clear()
+        self._buffers[name] = self.gl.buffer(f"scene {name}", np.ascontiguousarray(data))
+        return self._buffers[name]
+
+    def _upload_params(self) -> None:
+        self._bases: list[int] = []
+        values: list[float] = []
+        for compiled in self.compiled:
+            self._bases.append(len(values))
+            values += compiled.params
+        self._buffer("params", np.array(values or [0.0], "f4"))
+
+    def _upload_meshes(self, scene: Scene, wanted: list[str]) -> None:
+        meshes = scene.meshes
+        counts = [len(m.positions) for m in meshes]
+        self._base_vertex = np.concatenate([[0], np.cumsum(counts)]).astype("i8")
+        index_counts = [3 * len(m.triangles) for m in meshes]
+        self._first_index = np.concatenate([[0], np.cumsum(index_counts)]).astype("i8")
+        total = int(self._base_vertex[-1])
+        positions = np.concatenate([m.positions for m in meshes]) if total else np.zeros((1, 3), "f4")
+        self._buffer("positions", np.asarray(positions, "f4"))
+        normals = np.zeros((max(total, 1), 4), "i2")
+        if total:
+            normals[:, :3] = np.rint(np.concatenate([m.normals for m in meshes]) * 32767.0)
+        self._buffer("normals", normals)
+        indices = [m.triangles.reshape(-1) for m in meshes] if meshes else []
+        self._buffer("indices", np.concatenate(indices).astype("u4") if indices else np.zeros(3, "u4"))
+        for name in [n for n in self._streams if n not in wanted]:
+            self.gl.release(self._streams.pop(name), self._buffers.pop(f"attribute {name}", None))
+        for name in wanted:
+            parts = [_attribute(m, name) for m in meshes]
+            width = max((p.shape[1] for p in parts if p is not None), default=2)
+            data = np.zeros((max(total, 1), width), "f4")
+            for part, start in zip(parts, self._base_vertex[:-1], strict=True):
+                if part is not None:
+                    data[start : start + len(part), : part.shape[1]] = part
+                    if part.shape[1] < width == 4:
+                        data[start : start + len(part), 3] = 1.0
+            self._streams[name] = self._buffer(f"attribute {name}", data)
+        self._vaos.clear()
+        self._build_groups(scene)
+
+    def _build_groups(self, scene: Scene) -> None:
+        """Sort instances so that those alike in mesh, materials and visibility lie together."""
+        inst = scene.instances
+        keys: dict[tuple, list[int]] = {}
+        for i in range(len(inst)):
+            if not scene.meshes[inst.mesh[i]].empty:
+                keys.setdefault((int(inst.mesh[i]), inst.materials[i], int(inst.visibility[i])), []).append(i)
+        self._order = np.array([i for group in keys.values() for i in group], "i8")
+        self._groups: list[tuple[int, tuple[int, ...], int, int, int]] = []
+        start = 0
+        for (mesh, materials, visibility), members in keys.items():
+            self._groups.append((mesh, materials, visibility, start, len(members)))
+            start += len(members)
+        for buffer, _ in self._draws.values():
+            self.gl.release(buffer)
+        self._draws.clear()
+
+    def _upload_instances(self, scene: Scene) -> None:
+        inst = scene.instances
+        data = np.zeros(max(1, len(self._order)), _INSTANCE)
+        if len(self._order):
+            matrix = inst.matrix[self._order]
+            # A transform that is not a number places nothing: all its vertices fall together and draw nothing.
+            matrix = np.where(np.isfinite(matrix).all(axis=(1, 2))[:, None, None], matrix, 0.0)
+            data["row_0"], data["row_1"], data["row_2"] = (matrix[:, k, :3] for k in range(3))
+            data["translation"] = matrix[:, :3, 3]
+            bounds = np.stack([scene.meshes[m].bounds for m in inst.mesh[self._order]])
+            size = bounds[:, 1] - bounds[:, 0]
+            data["texspace_min"] = bounds[:, 0]
+            data["texspace_scale"] = np.where(size > 0.0, 1.0 / np.where(size > 0.0, size, 1.0), 0.0)
+            data["color"] = inst.color[self._order]
+            data["info"][:, 0] = inst.index[self._order]
+            data["info"][:, 1] = inst.random[self._order]
+        self._buffer("instances", data)
+
+    def _sync_textures(self, scene: Scene) -> None:
+        used = {i for c in (*self.compiled, self.world) for i in c.images}
+        wanted = {scene.images[i].uid: scene.images[i] for i in used if i < len(scene.images)}
+        for uid in [u for u in self._textures if u not in wanted]:
+            self.gl.release(self._textures.pop(uid))
+        for uid, image in wanted.items():
+            if uid not in self._textures:
+                self._textures[uid] = self._upload_image(image)
+                self.uploads["images"] = self.uploads.get("images", 0) + 1
+
+    def _upload_image(self, image: Image) -> moderngl.Texture:
+        pixels = np.ascontiguousarray(image.pixels)
+        height, width = pixels.shape[:2]
+        limit = self.gl.max_texture_size
+        if max(width, height) > limit:
+            step = -(-max(width, height) // limit)
+            pixels = np.ascontiguousarray(pixels[::step, ::step])
+            height, width = pixels.shape[:2]
+        if pixels.dtype == np.uint8:
+            fmt = "srgb8_a8" if image.colorspace == "srgb" else "rgba8"
+        else:
+            finite = np.nan_to_num(pixels, nan=0.0, posinf=65504.0, neginf=0.0)
+            pixels = np.clip(finite, -65504.0, 65504.0).astype("f2")
+            fmt = "rgba16f"
+        texture = self.gl.texture(f"image {image.name}", (width, height), fmt, pixels)
+        texture.build_mipmaps()
+        return texture
+
+    # -- drawing -------------------------------------------------------------------------------------------------
+
+    def draw(self, planned: Planned, stages, visibility: int, clip_from_world: np.ndarray, **options) -> None:
+        """Draw surfaces that ``visibility`` rays see, each with its material's function.
+
+        ``stages`` are the pass's shader files; ``options`` go to :meth:`_programs`.
+        """
+        for material, program, vao, buffer, batch in self._prepared(planned, stages, visibility, options):
+            program["clip_from_world"].write(clip_from_world)
+            if material >= 0:
+                self._bind_material(program, self.compiled[material], self._bases[material], options["units"])
+            vao.render_indirect(buffer, moderngl.TRIANGLES, batch.count, batch.first)
+
+    def programs(self, planned: Planned, stages, visibility: int, **options) -> list:
+        """The programs that :meth:`draw` will use, so that their uniforms can be set once."""
+        return list({id(p): p for _, p, *_ in self._prepared(planned, stages, visibility, options)}.values())
+
+    def _prepared(self, planned: Planned, stages, visibility: int, options) -> list[tuple]:
+        full, units = options["full"], options["units"]
+        opaque_alone = not full
+        key = ("draws", visibility, full, self._mesh_key, self._material_key)
+        cached = planned.programs.get(key)
+        if cached is not None and cached[0] is self._draw_list(visibility, opaque_alone)[0]:
+            if all(vao is self._vaos.get(vkey) for vkey, vao in cached[2]):
+                return cached[1]
+        buffer, batches = self._draw_list(visibility, opaque_alone)
+        out, vaos = [], []
+        for batch in batches:
+            material = batch.material
+            compiled = self.compiled[material] if material >= 0 else None
+            with_material = full or compiled is not None
+            program = self._program(planned, stages, compiled, with_material, units, options.get("defines", {}))
+            attributes = tuple(compiled.attributes[:_MAX_ATTRIBUTES]) if with_material and compiled else ()
+            vkey, vao = self._vao(program, attributes)
+            out.append((material if with_material else -1, program, vao, buffer, batch))
+            vaos.append((vkey, vao))
+        planned.programs[key] = (buffer, out, vaos)
+        return out
+
+    def _program(self, planned, stages, compiled: CompiledGraph | None, with_material, units: int, defines):
+        glsl = compiled.glsl if compiled else ""
+        object_space = any(
+            word in glsl for word in ("_os", "generated", "object_", "point.object", "world_from_object")
+        )  # fmt: skip
+        defines = {
+            **planned.defines(),
+            **defines,
+            "SURFACE_FULL": int(with_material),
+            "SURFACE_DEPTH": int(not with_material),
+            "SURFACE_OBJECT_SPACE": int(object_space),
+            "SURFACE_ATTRIBUTES": min(len(compiled.attributes), _MAX_ATTRIBUTES) if compiled else 0,
+            "SURFACE_TRANSPARENT": int(bool(compiled and (compiled.transparent or compiled.transmissive))),
+        }
+        virtual = {**GENERATED, "generated/material.glsl": ""}
+        if with_material and compiled is not None:
+            virtual["generated/material.glsl"] = material_source(compiled, units)
+        return self.gl.program(
+            planned.title,
+            stages,
+            prelude={"vertex": "", "fragment": planned.prelude("fragment")},
+            defines=defines,
+            virtual=virtual,
+        )
+
+    def _draw_list(self, visibility: int, opaque_alone: bool) -> tuple[moderngl.Buffer, list[Batch]]:
+        """Indirect commands of what ``visibility`` rays see. With ``opaque_alone`` opaque materials share a batch."""
+        key = (visibility, opaque_alone)
+        if key in self._draws:
+            return self._draws[key]
+        per_material: dict[int, list[tuple]] = {}
+        for mesh_index, materials, seen, first_instance, count in self._groups:
+            if not seen & visibility:
+                continue
+            mesh = self._scene.meshes[mesh_index]
+            for slot, first, triangles in mesh.slots:
+                if triangles == 0 or not materials:
+                    continue
+                material = materials[min(int(slot), len(materials) - 1)]
+                compiled = self.compiled[material]
+                if opaque_alone and not (compiled.transparent or compiled.transmissive):
+                    material = -1
+                command = (
+                    3 * int(triangles), count, int(self._first_index[mesh_index]) + 3 * int(first),
+                    int(self._base_vertex[mesh_index]), first_instance,
+                )  # fmt: skip
+                per_material.setdefault(material, []).append(command)
+        commands: list[tuple] = []
+        batches: list[Batch] = []
+        for material in sorted(per_material):
+            batches.append(Batch(material, len(commands), len(per_material[material])))
+            commands += per_material[material]
+        data = np.array(commands or [(0,) * 5], "u4")
+        self._draws[key] = (self.gl.buffer("scene draw commands", data), batches)
+        return self._draws[key]
+
+    def _vao(self, program, attributes: tuple[str, ...]):
+        key = (program.glo, attributes)
+        if key not in self._vaos:
+            content = [(self._buffers["positions"], "3f", "in_position")]
+            if "in_normal" in program:
+                content.append((self._buffers["normals"], "4i2", "in_normal"))
+            for slot, name in enumerate(attributes):
+                if f"in_attribute_{slot}" in program:
+                    width = self._streams[name].size // 4 // max(1, self._buffers["positions"].size // 12)
+                    content.append((self._streams[name], f"{width}f", f"in_attribute_{slot}"))
+            formats, names = [], []
+            for part, name in zip(_INSTANCE_FORMAT.removesuffix("/i").split(), _INSTANCE_NAMES, strict=True):
+                if name in program:
+                    formats.append(part)
+                    names.append(name)
+                else:
+                    formats.append(f"{4 * int(part[0])}x")
+            content.append((self._buffers["instances"], " ".join(formats) + "/i", *names))
+            self._vaos[key] = self.gl.ctx.vertex_array(program, content, self._buffers["indices"])
+        return key, self._vaos[key]
+
+    def bind_params(self) -> None:
+        """Bind the material parameters for the draws that follow."""
+        self._buffers["params"].bind_to_storage_buffer(_PARAMS_BINDING)
+
+    def _bind_material(self, program, compiled: CompiledGraph, base: int, units: int) -> None:
+        if "material_base" in program:
+            program["material_base"].value = base
+        self.bind_images(compiled, units)
+
+    def bind_images(self, compiled: CompiledGraph, units: int) -> None:
+        """Bind a graph's images from texture unit ``units`` on."""
+        for slot, (index, (interpolation, extension)) in enumerate(
+            zip(compiled.images, compiled.samplers, strict=True)
+        ):
+            texture = self._textures[self._scene.images[index].uid]
+            self._sampler(interpolation, extension).use(units + slot)
+            texture.use(units + slot)
+
+    def unbind_images(self, units: int, count: int) -> None:
+        """Take sampler objects off the units again: they would override later textures' own modes."""
+        for slot in range(count):
+            self.gl.ctx.clear_samplers(units + slot, units + slot + 1)
+
+    def bind_world_params(self) -> None:
+        """Bind the world's parameters in place of the materials'."""
+        self._buffers["world_params"].bind_to_storage_buffer(_PARAMS_BINDING)
+
+    def _sampler(self, interpolation: str, extension: str) -> moderngl.Sampler:
+        key = (interpolation == "Closest", extension)
+        if key not in self._samplers:
+            sampler = self.gl.ctx.sampler()
+            sampler.filter = (
+                (moderngl.NEAREST, moderngl.NEAREST)
+                if key[0]
+                else (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
+            )
+            if not key[0]:
+                sampler.anisotropy = _ANISOTROPY
+            sampler.repeat_x = sampler.repeat_y = extension == "REPEAT"
+            self._samplers[key] = sampler
+        return self._samplers[key]
+
+    def close(self) -> None:
+        """Free all GPU memory of this scene."""
+        self.gl.release(*self._buffers.values(), *self._textures.values(), *(b for b, _ in self._draws.values()))
+        for vao in self._vaos.values():
+            vao.release()
+        self.__init__(self.gl)
+
+
+def material_source(compiled: CompiledGraph, units: int) -> str:
+    """``generated/material.glsl`` of a surface: its images, parameters, attributes and function."""
+    lines = ["#define SURFACE_IMPLICIT_LOD 1"]
+    lines.append(f"layout(std430, binding = {_PARAMS_BINDING}) readonly buffer material_block {{ float material_params[]; }};")
+    lines.append("uniform int material_base;")
+    lines.append("float material_param(int i) { return material_params[material_base + i]; }")
+    lines += _image_lines(compiled, units)
+    for slot in range(len(compiled.attributes)):
+        if slot < _MAX_ATTRIBUTES:
+            lines.append(f"in vec4 vary_attribute_{slot};")
+            lines.append(f"#define attribute_value_{slot} vary_attribute_{slot}")
+        else:
+            lines.append(f"const vec4 attribute_value_{slot} = vec4(0.0);")
+    lines += ['#include "nodes/closures.glsl"', '#include "nodes/math.glsl"', '#include "nodes/color.glsl"',
+              '#include "nodes/texture.glsl"', '#include "nodes/normal.glsl"', compiled.glsl]  # fmt: skip
+    return "\n".join(lines)
+
+
+def world_source(compiled: CompiledGraph, units: int) -> str:
+    """``generated/world.glsl``: ``vec3 world_radiance(vec3 direction_ws)``."""
+    lines = ["#define SURFACE_IMPLICIT_LOD 0"]  # worlds are evaluated in compute shaders
+    lines.append(f"layout(std430, binding = {_PARAMS_BINDING}) readonly buffer world_block {{ float world_params[]; }};")
+    lines.append("float material_param(int i) { return world_params[i]; }")
+    lines += _image_lines(compiled, units)
+    lines += ['#include "lib/surface_lib.glsl"', '#include "nodes/math.glsl"', '#include "nodes/color.glsl"',
+              '#include "nodes/texture.glsl"', compiled.glsl]  # fmt: skip
+    return "\n".join(lines)
+
+
+def _image_lines(compiled: CompiledGraph, units: int) -> list[str]:
+    return [
+        f"layout(binding = {units + slot}) uniform sampler2D material_image_{slot};"
+        for slot in range(len(compiled.images))
+    ]
+
+
+def _attribute(mesh: Mesh, name: str) -> np.ndarray | None:
+    """A mesh's data for an attribute name of the compiler; None where it has none."""
+    kind, _, layer = name.partition(":")
+    attributes = mesh.attributes
+    if kind == "uv":
+        return attributes.get(f"uv:{layer or mesh.active_uv}")
+    if kind == "color":
+        return attributes.get(f"color:{layer or mesh.active_color}")
+    for prefix in ("attr", "color", "uv"):
+        if f"{prefix}:{layer}" in attributes:
+            return attributes[f"{prefix}:{layer}"]
+    return None
+
+

@@ -1,0 +1,227 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The render engine ``QUARTET``.
+
+``update()`` reads Blender's data into a plain Scene while Blender holds still; ``render()`` may run on another thread and
+uses nothing of Blender's but the result and the progress bar. All OpenGL happens on Quartet's own GL thread.
+"""
+
+from __future__ import annotations
+
+import concurrent.futures
+import traceback
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ..gl import Cancelled, CancelToken, GLError, shared
+from ..outputs import OUTPUTS
+from ..renderer import Renderer, RenderError
+from ..scene import Scene
+from ..settings import SettingError, Settings
+from . import properties
+from .sync import SceneSync
+
+_POLL_SECONDS = 0.05
+
+
+@dataclass
+class Job:
+    """One view layer to render: plain data, safe on any thread."""
+
+    scene: Scene
+    settings: Settings
+    outputs: tuple[str, ...]
+    resolution: tuple[int, int]
+    region: tuple[int, int, int, int]
+    layer: str
+    film_transparent: bool
+    persistent: bool
+
+
+class QuartetEngine(bpy.types.RenderEngine):
+    """Four real-time global illumination techniques, next to Cycles."""
+
+    bl_idname = "QUARTET"
+    bl_label = "Quartet GI"
+    bl_use_preview = True
+    bl_use_postprocess = True
+    bl_use_eevee_viewport = True
+    bl_use_shading_nodes_custom = False
+
+    # Blender may run __init__ twice on one object, so nothing is made there; class attributes are the empty state.
+    _job: Job | None = None
+    _sync: SceneSync | None = None
+    _renderer: Renderer | None = None
+    _failure: str = ""
+
+    # -- final render --------------------------------------------------------------------------------------------
+
+    def update(self, data, depsgraph) -> None:
+        """Read the view layer's scene. Errors are kept for render(), which Blender always calls next."""
+        self._job, self._failure = None, ""
+        try:
+            self._job = self._read(depsgraph)
+        except (RenderError, SettingError) as error:
+            self._failure = str(error)
+        except Exception as error:  # noqa: BLE001 - Blender would swallow it and save a black file
+            traceback.print_exc()
+            self._failure = f"the scene could not be read: {type(error).__name__}: {error}"
+
+    def _read(self, depsgraph) -> Job:
+        scene = depsgraph.scene
+        render = scene.render
+        resolution, region = picture(render)
+        if min(region[2:]) < 1:
+            raise RenderError(
+                f"at {render.resolution_percentage} % the picture has {resolution[0]} × {resolution[1]} pixels; "
+                "nothing to render"
+            )
+        persistent = bool(render.use_persistent_data)
+        if self._sync is None:
+            self._sync = SceneSync()
+        elif persistent:
+            self._sync.invalidate(depsgraph)
+        plain = self._sync.read(depsgraph, resolution=resolution, keep=persistent)
+        layer = depsgraph.view_layer
+        wanted = ("Combined", *(o.name for o in OUTPUTS.values() if o.name != "Combined" and pass_enabled(layer, o)))
+        return Job(
+            plain, properties.read(scene), wanted, resolution, region, layer.name, bool(render.film_transparent),
+            persistent,
+        )  # fmt: skip
+
+    def render(self, depsgraph) -> None:
+        """Render the job and write the result. Never raises: Blender would show a black picture and call it done."""
+        job, self._job = self._job, None
+        try:
+            if job is None:
+                raise RenderError(self._failure or "nothing was read to render")
+            self._render(job)
+        except Cancelled:
+            pass
+        except (RenderError, GLError, SettingError) as error:
+            self._fail(str(error))
+        except Exception as error:  # noqa: BLE001 - as above
+            traceback.print_exc()
+            self._fail(f"{type(error).__name__}: {error}")
+        finally:
+            if job is None or not job.persistent:
+                self._free()
+
+    def _fail(self, message: str) -> None:
+        self.error_set(f"Quartet: {message}")
+        self.report({"ERROR"}, f"Quartet: {message}")
+
+    def _render(self, job: Job) -> None:
+        cancel = CancelToken()
+        state = {"progress": 0.0, "text": ""}
+
+        def progress(share: float, text: str) -> None:
+            state["progress"], state["text"] = share, text
+
+        def work(gl):
+            if self._renderer is None:
+                self._renderer = Renderer(gl)
+            return self._renderer.render(
+                job.scene, job.settings, job.outputs, resolution=job.resolution, region=job.region,
+                film_transparent=job.film_transparent, progress=progress, cancel=cancel,
+            )  # fmt: skip
+
+        self.update_stats("", "Quartet: preparing")
+        future = shared().submit(work, cancel=cancel)
+        while True:
+            done, _ = concurrent.futures.wait([future], timeout=_POLL_SECONDS)
+            self.update_progress(state["progress"])
+            if state["text"]:
+                self.update_stats("", f"Quartet: {state['text']}")
+            if done:
+                break
+            if self.test_break():
+                cancel.cancel()
+        result = future.result()
+        for note in result.notes:
+            self.report({"INFO"}, f"Quartet: {note}")
+        self._write(job, result.passes)
+
+    def _write(self, job: Job, passes: dict[str, np.ndarray]) -> None:
+        width, height = job.region[2:]
+        result = self.begin_result(0, 0, width, height, layer=job.layer)
+        try:
+            for target in result.layers[0].passes:
+                array = passes.get(target.name)
+                if array is None:
+                    continue
+                rows, columns = height, width
+                array = array[:rows, :columns]
+                if array.shape[-1] != target.channels:
+                    array = np.repeat(array[..., :1], target.channels, axis=-1)
+                target.rect.foreach_set(np.ascontiguousarray(array, np.float32).ravel())
+        finally:
+            self.end_result(result)
+
+    def _free(self) -> None:
+        """Give GPU memory back."""
+        renderer, self._renderer, self._sync = self._renderer, None, None
+        if renderer is not None:
+            try:
+                shared().call(lambda gl: renderer.close())
+            except GLError:
+                pass  # the context is gone, and the memory with it
+
+    # -- passes --------------------------------------------------------------------------------------------------
+
+    def update_render_passes(self, scene=None, renderlayer=None) -> None:
+        """Tell the compositor which passes there will be."""
+        for output in OUTPUTS.values():
+            if output.name == "Combined" or pass_enabled(renderlayer, output):
+                self.register_pass(
+                    scene, renderlayer, output.name, len(output.channels), output.channels, output.kind
+                )
+
+
+def pass_enabled(layer: bpy.types.ViewLayer, output) -> bool:
+    """Whether the view layer asks for a pass."""
+    owner, _, flag = output.flag.rpartition(".")
+    target = getattr(layer, owner, None) if owner else layer
+    return bool(getattr(target, flag, False))
+
+
+def picture(render: bpy.types.RenderSettings) -> tuple[tuple[int, int], tuple[int, int, int, int]]:
+    """Size of the whole picture and the region (x, y, width, height) to render, row 0 at the bottom."""
+    width = render.resolution_x * render.resolution_percentage // 100
+    height = render.resolution_y * render.resolution_percentage // 100
+    if not render.use_border:
+        return (width, height), (0, 0, width, height)
+    x0, x1 = int(render.border_min_x * width), int(render.border_max_x * width)
+    y0, y1 = int(render.border_min_y * height), int(render.border_max_y * height)
+    return (width, height), (x0, y0, max(0, x1 - x0), max(0, y1 - y0))
+
+
+# Panels of Blender's own that make sense for this engine: those that any engine may use, and EEVEE's and Cycles'
+# common ones by their names.
+_NOT_OURS = {
+    "VIEWLAYER_PT_filter", "VIEWLAYER_PT_layer_passes", "RENDER_PT_eevee", "RENDER_PT_simplify_greasepencil",
+}  # fmt: skip
+
+
+def _panels() -> list[type]:
+    out = []
+    for panel in bpy.types.Panel.__subclasses__():
+        engines = getattr(panel, "COMPAT_ENGINES", None)
+        if engines and "BLENDER_RENDER" in engines and panel.__name__ not in _NOT_OURS:
+            out.append(panel)
+    return out
+
+
+def register() -> None:
+    bpy.utils.register_class(QuartetEngine)
+    for panel in _panels():
+        panel.COMPAT_ENGINES.add("QUARTET")
+
+
+def unregister() -> None:
+    for panel in bpy.types.Panel.__subclasses__():
+        engines = getattr(panel, "COMPAT_ENGINES", None)
+        if engines and "QUARTET" in engines:
+            engines.discard("QUARTET")
+    bpy.utils.unregister_class(QuartetEngine)

@@ -1,0 +1,308 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blender's node trees to ShaderGraphs: groups opened, reroutes and muted nodes passed through, images collected."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ..scene import Image, Link, Material, Node, ShaderGraph, World
+
+_SRGB = ("sRGB", "sRGB - Texture", "Filmic sRGB", "AgX Base sRGB")
+_DATA = ("Non-Color", "Raw", "Generic Data", "Utility - Raw")
+
+# Settings of nodes that decide what they compute.
+_PARAMS: dict[str, tuple[str, ...]] = {
+    "BSDF_PRINCIPLED": ("distribution", "subsurface_method"), "BSDF_GLOSSY": ("distribution",),
+    "BSDF_METALLIC": ("distribution", "fresnel_type"), "BSDF_GLASS": ("distribution",),
+    "MATH": ("operation", "use_clamp"), "VECT_MATH": ("operation",),
+    "MIX": ("data_type", "blend_type", "factor_mode", "clamp_factor", "clamp_result"),
+    "MIX_RGB": ("blend_type", "use_clamp"), "MAPPING": ("vector_type",), "SEPARATE_COLOR": ("mode",),
+    "COMBINE_COLOR": ("mode",), "CLAMP": ("clamp_type",),
+    "MAP_RANGE": ("data_type", "interpolation_type", "clamp"), "NORMAL_MAP": ("space", "uv_map"), "UVMAP": ("uv_map",),
+    "ATTRIBUTE": ("attribute_name", "attribute_type"), "VERTEX_COLOR": ("layer_name",), "BUMP": ("invert",),
+    "TEX_IMAGE": ("interpolation", "extension", "projection", "projection_blend"),
+    "TEX_ENVIRONMENT": ("interpolation", "projection"), "TEX_NOISE": ("noise_dimensions", "noise_type", "normalize"),
+    "TEX_VORONOI": ("voronoi_dimensions", "feature", "distance", "normalize"),
+    "TEX_WAVE": ("wave_type", "bands_direction", "rings_direction", "wave_profile"),
+    "TEX_GRADIENT": ("gradient_type",), "TEX_WHITE_NOISE": ("noise_dimensions",), "TEX_MAGIC": ("turbulence_depth",),
+    "TEX_BRICK": ("offset", "offset_frequency", "squash", "squash_frequency"),
+    "TEX_SKY": ("sky_type", "sun_direction", "turbidity", "ground_albedo", "sun_disc", "sun_size", "sun_intensity",
+                "sun_elevation", "sun_rotation", "altitude", "air_density", "dust_density", "aerosol_density",
+                "ozone_density"),
+    "VECTOR_ROTATE": ("rotation_type", "invert"), "VECT_TRANSFORM": ("vector_type", "convert_from", "convert_to"),
+    "SUBSURFACE_SCATTERING": ("falloff",),
+}  # fmt: skip
+
+_CURVE_ENTRIES = 257  # rows of a sampled ramp or curve: Cycles samples them at 256
+
+
+class ImageTable:
+    """The scene's images, each read once. ``notes`` gets a line for each that can't be read."""
+
+    def __init__(self, cache: dict[int, tuple[tuple, Image]], notes: list[str]) -> None:
+        self._cache = cache
+        self._notes = notes
+        self._index: dict[int, int] = {}
+        self.images: list[Image] = []
+
+    def index(self, image: bpy.types.Image | None, owner: str) -> int | None:
+        """Index of ``image`` among :attr:`images`; None for a node without one."""
+        if image is None:
+            return None
+        key = image.original.session_uid
+        if key not in self._index:
+            self._index[key] = len(self.images)
+            self.images.append(self._read(image, key, owner))
+        return self._index[key]
+
+    def _read(self, image: bpy.types.Image, key: int, owner: str) -> Image:
+        stamp = (image.filepath, tuple(image.size), image.colorspace_settings.name, image.is_dirty, image.source)
+        cached = self._cache.get(key)
+        if cached and cached[0] == stamp and not image.is_dirty and image.source != "SEQUENCE":
+            return cached[1]
+        width, height = image.size
+        if width * height == 0 or image.channels == 0:
+            where = bpy.path.abspath(image.filepath) or "no file"
+            self._notes.append(f"image {image.name} of {owner} can't be read ({where}); it shows magenta")
+            return Image.placeholder(image.name)
+        pixels = np.empty(width * height * 4, np.float32)
+        image.pixels.foreach_get(pixels)
+        pixels = pixels.reshape(height, width, 4)
+        name = image.colorspace_settings.name
+        space = "data" if name in _DATA else "srgb" if name in _SRGB else "linear"
+        if not image.is_float:
+            pixels = (pixels * 255.0 + 0.5).astype(np.uint8)
+            if space == "linear" and not name.startswith("Linear"):
+                self._notes.append(f"image {image.name}: colour space {name} is taken as sRGB")
+                space = "srgb"
+        elif space == "srgb":
+            space = "linear"  # Blender decodes float pixels when it loads them
+        result = Image(image.name, pixels, space)
+        self._cache[key] = (stamp, result)
+        return result
+
+
+class GraphReader:
+    """Reads one node tree."""
+
+    def __init__(self, images: ImageTable, owner: str) -> None:
+        self.images = images
+        self.owner = owner
+        self.nodes: list[Node] = []
+        self._made: dict[tuple, int] = {}
+
+    def read(self, tree: bpy.types.NodeTree, output_type: str, target: str = "CYCLES") -> ShaderGraph:
+        """The graph that feeds the tree's active output."""
+        output = _active_output(tree, output_type, target)
+        if output is None:
+            return ShaderGraph()
+        surface = self._source(output.inputs["Surface"], ())
+        volume = self._source(output.inputs["Volume"], ()) if "Volume" in output.inputs else None
+        return ShaderGraph(
+            tuple(self.nodes),
+            surface if isinstance(surface, Link) else None,
+            volume if isinstance(volume, Link) else None,
+        )
+
+    def _source(self, socket: bpy.types.NodeSocket, path: tuple) -> Link | Any:
+        """What feeds an input: a Link, or the socket's own value (None for closures and unset vectors)."""
+        for _ in range(1000):  # a chain of reroutes and groups ends; a damaged file's may not
+            if not socket.is_linked or not socket.links or socket.links[0].is_muted:
+                return _value(socket)
+            link = socket.links[0]
+            node, out = link.from_node, link.from_socket
+            if node.type == "REROUTE":
+                socket = node.inputs[0]
+            elif node.mute:
+                inner = next((i.from_socket for i in node.internal_links if i.to_socket == out), None)
+                if inner is None:
+                    return _value(socket)
+                socket = inner
+            elif node.type == "GROUP_INPUT":
+                if not path:
+                    return _value(socket)
+                owner = path[-1]
+                outer = next((s for s in owner.inputs if s.identifier == out.identifier), None)
+                if outer is None:
+                    return _value(socket)
+                socket, path = outer, path[:-1]
+            elif node.type == "GROUP" and node.node_tree is not None:
+                inside = next(
+                    (n for n in node.node_tree.nodes if n.type == "GROUP_OUTPUT" and n.is_active_output), None
+                )
+                inner = inside and next((s for s in inside.inputs if s.identifier == out.identifier), None)
+                if inner is None:
+                    return _value(socket)
+                socket, path = inner, (*path, node)
+            else:
+                return Link(self._node(node, path), out.identifier)
+        return _value(socket)
+
+    def _node(self, node: bpy.types.Node, path: tuple) -> int:
+        key = (*(n.as_pointer() for n in path), node.as_pointer())
+        if key in self._made:
+            return self._made[key]
+        # The slot is taken first: a cycle then refers to it instead of recursing for ever.
+        index = self._made[key] = len(self.nodes)
+        self.nodes.append(Node("NONE"))
+        inputs: dict[str, Any] = {}
+        for socket in node.inputs:
+            if socket.enabled or socket.is_linked:
+                value = self._source(socket, path)
+                if value is not None:
+                    inputs[socket.identifier] = value
+        self.nodes[index] = Node(node.type, node.label or node.name, inputs, self._params(node))
+        return index
+
+    def _params(self, node: bpy.types.Node) -> dict[str, Any]:
+        params = {
+            name: _plain(getattr(node, name)) for name in _PARAMS.get(node.type, ()) if hasattr(node, name)
+        }
+        if node.type in ("TEX_IMAGE", "TEX_ENVIRONMENT"):
+            params["image"] = self.images.index(node.image, self.owner)
+            if node.image is not None:
+                params["alpha_mode"] = {"PREMUL": "PREMUL", "NONE": "NONE"}.get(node.image.alpha_mode, "STRAIGHT")
+        if node.type == "RGB":
+            params["value"] = tuple(node.outputs[0].default_value[:3])
+        elif node.type == "VALUE":
+            params["value"] = float(node.outputs[0].default_value)
+        elif node.type == "NORMAL":
+            params["normal"] = tuple(node.outputs[0].default_value)
+        elif node.type == "TEX_COORD":
+            params["object"] = bool(node.object)
+        elif node.type == "VALTORGB":
+            ramp = node.color_ramp
+            params["table"] = [tuple(ramp.evaluate(i / (_CURVE_ENTRIES - 1))) for i in range(_CURVE_ENTRIES)]
+            params["constant"] = ramp.interpolation == "CONSTANT"
+        elif node.type in ("CURVE_RGB", "CURVE_VEC", "CURVE_FLOAT"):
+            params.update(_curves(node))
+        mapping = getattr(node, "texture_mapping", None)
+        if mapping is not None:
+            matrix = _texture_mapping(mapping)
+            if matrix is not None:
+                params["texture_mapping"] = matrix
+        return params
+
+
+def _active_output(tree: bpy.types.NodeTree, kind: str, target: str):
+    outputs = [n for n in tree.nodes if n.type == kind and not n.mute]
+    for wanted in (target, "ALL", None):
+        found = [n for n in outputs if wanted is None or getattr(n, "target", "ALL") == wanted]
+        active = [n for n in found if n.is_active_output]
+        if active or found:
+            return (active or found)[0]
+    return None
+
+
+def _value(socket: bpy.types.NodeSocket) -> Any:
+    """An unlinked socket's value; None where the node decides (closures, hidden vectors such as Normal)."""
+    if socket.type == "SHADER" or getattr(socket, "hide_value", False):
+        return None
+    value = getattr(socket, "default_value", None)
+    return None if value is None else _plain(value, color=socket.type == "RGBA")
+
+
+def _plain(value: Any, *, color: bool = False) -> Any:
+    if isinstance(value, (bool, int, float, str)):
+        return value
+    if hasattr(value, "__len__"):
+        numbers = tuple(float(v) for v in value)
+        return numbers[:3] if color else numbers
+    return str(value)
+
+
+def _curves(node: bpy.types.Node) -> dict[str, Any]:
+    mapping = node.mapping
+    mapping.initialize()
+    low, high = (mapping.clip_min_x, mapping.clip_max_x) if mapping.use_clip else (-1.0, 1.0)
+    if node.type != "CURVE_VEC" and mapping.use_clip is False:
+        low, high = 0.0, 1.0
+    xs = [low + (high - low) * i / (_CURVE_ENTRIES - 1) for i in range(_CURVE_ENTRIES)]
+    curves = mapping.curves
+    rows = []
+    for x in xs:
+        if node.type == "CURVE_FLOAT":
+            rows.append((mapping.evaluate(curves[0], x), 0.0, 0.0, 0.0))
+        elif node.type == "CURVE_VEC":
+            rows.append((*(mapping.evaluate(curves[k], x) for k in range(3)), 0.0))
+        else:  # the combined curve comes first
+            rows.append((*(mapping.evaluate(curves[k], mapping.evaluate(curves[3], x)) for k in range(3)), 0.0))
+    return {"table": rows, "range": (low, high)}
+
+
+def _texture_mapping(mapping) -> list[tuple[float, ...]] | None:
+    """Rows (3 × 4) of a texture node's own mapping; None for the identity."""
+    from mathutils import Euler, Matrix
+
+    axes = {"NONE": None, "X": 0, "Y": 1, "Z": 2}
+    used = [axes[mapping.mapping_x], axes[mapping.mapping_y], axes[mapping.mapping_z]]
+    scale = tuple(mapping.scale)
+    if mapping.vector_type == "TEXTURE":
+        scale = tuple(1.0 / s if s else 0.0 for s in scale)
+    rotation = Euler(mapping.rotation).to_matrix().to_4x4()
+    matrix = Matrix.Translation(mapping.translation) @ rotation @ Matrix.Diagonal((*scale, 1.0))
+    if mapping.vector_type == "TEXTURE":
+        matrix = Matrix.Diagonal((*scale, 1.0)) @ rotation.inverted() @ Matrix.Translation(-mapping.translation)
+    elif mapping.vector_type in ("VECTOR", "NORMAL"):
+        matrix = rotation @ Matrix.Diagonal((*scale, 1.0))
+    pick = Matrix.Diagonal((0.0, 0.0, 0.0, 1.0))
+    for row, column in enumerate(used):
+        if column is not None:
+            pick[row][column] = 1.0
+    matrix = matrix @ pick
+    rows = [tuple(float(v) for v in matrix[r]) for r in range(3)]
+    identity = all(abs(matrix[r][k] - (1.0 if r == k else 0.0)) < 1e-6 for r in range(3) for k in range(4))
+    return None if identity else rows
+
+
+def _trees(data) -> Iterator[bpy.types.NodeTree]:
+    """The tree to read: with closures, bundles and zones resolved where Blender offers that."""
+    if hasattr(data, "inline_shader_nodes"):
+        try:
+            inlined = data.inline_shader_nodes()
+        except RuntimeError:
+            inlined = None
+        if inlined is not None:
+            yield inlined.node_tree  # `inlined` stays referenced while the tree is in use
+            return
+    yield data.node_tree
+
+
+def read_material(material: bpy.types.Material, images: ImageTable) -> Material:
+    """A Material from Blender's."""
+    graph = ShaderGraph()
+    if material.node_tree is not None and getattr(material, "use_nodes", True):
+        for tree in _trees(material):
+            graph = GraphReader(images, f"material {material.name}").read(tree, "OUTPUT_MATERIAL")
+    else:
+        graph = ShaderGraph(
+            (Node("BSDF_PRINCIPLED", material.name, {
+                "Base Color": tuple(material.diffuse_color[:3]), "Metallic": material.metallic,
+                "Roughness": material.roughness,
+            }),), Link(0, "BSDF"),
+        )  # fmt: skip
+    return Material(material.name, graph, pass_index=material.pass_index)
+
+
+def default_material() -> Material:
+    """What Blender shows where a surface has no material: grey, diffuse."""
+    return Material("No Material", ShaderGraph((Node("BSDF_DIFFUSE", "", {"Color": (0.8, 0.8, 0.8)}),), Link(0, "BSDF")))
+
+
+def read_world(world: bpy.types.World | None, images: ImageTable) -> World:
+    """A World from Blender's; black where the scene has none."""
+    if world is None:
+        return World()
+    graph = ShaderGraph()
+    if world.node_tree is not None and getattr(world, "use_nodes", True):
+        for tree in _trees(world):
+            graph = GraphReader(images, f"world {world.name}").read(tree, "OUTPUT_WORLD")
+    else:
+        node = Node("BACKGROUND", world.name, {"Color": tuple(world.color), "Strength": 1.0})
+        graph = ShaderGraph((node,), Link(0, "Background"))
+    visible = getattr(getattr(world, "cycles_visibility", None), "camera", True)
+    return World(graph, world.light_settings.distance, bool(visible))

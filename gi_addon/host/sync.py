@@ -1,0 +1,444 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blender's dependency graph to a plain Scene.
+
+Only in ``update()`` and the like may Blender's data be read; what comes out holds none of it. Nothing evaluated is kept
+past the loop. Meshes, materials and images that did not change since the last sync are the same objects as then.
+"""
+
+from __future__ import annotations
+
+import math
+
+import bpy
+import numpy as np
+
+from ..scene import (
+    ALL_RAYS,
+    CAMERA,
+    DIFFUSE,
+    GLOSSY,
+    HOLDOUT,
+    SHADOW,
+    TRANSMISSION,
+    VOLUME,
+    Camera,
+    Image,
+    Instances,
+    Light,
+    Material,
+    Mesh,
+    Scene,
+    World,
+)
+from .materials import ImageTable, default_material, read_material, read_world
+
+_MESH_LIKE = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
+_RAYS = (("visible_camera", CAMERA), ("visible_diffuse", DIFFUSE), ("visible_glossy", GLOSSY),
+         ("visible_transmission", TRANSMISSION), ("visible_volume_scatter", VOLUME),
+         ("visible_shadow", SHADOW))  # fmt: skip
+
+
+class SceneSync:
+    """Keeps what the next sync can use again. ``counts`` says what the last one really read."""
+
+    def __init__(self) -> None:
+        self._meshes: dict[tuple, Mesh] = {}
+        self._materials: dict[int, Material] = {}
+        self._material_images: dict[int, list[tuple[int, Image]]] = {}
+        self._images: dict[int, tuple[tuple, Image]] = {}
+        self._world: tuple[int, World] | None = None
+        self._default = default_material()
+        self.counts: dict[str, int] = {}
+
+    def forget(self) -> None:
+        """Drop everything kept: after undo, file load, or when in doubt."""
+        self.__init__()
+
+    def invalidate(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """Drop what the depsgraph's updates say has changed."""
+        for update in depsgraph.updates:
+            data = update.id
+            uid = data.original.session_uid
+            if isinstance(data, bpy.types.Object):
+                if update.is_updated_geometry:
+                    self._meshes = {k: v for k, v in self._meshes.items() if k[0] != uid}
+            elif isinstance(data, bpy.types.Material):
+                self._materials.pop(uid, None)
+            elif isinstance(data, bpy.types.World):
+                self._world = None
+            elif isinstance(data, bpy.types.NodeTree):
+                # A shared node group: any material may use it.
+                self._materials.clear()
+                self._world = None
+            elif isinstance(data, bpy.types.Image):
+                self._images.pop(uid, None)
+                self._materials.clear()
+                self._world = None
+            elif isinstance(data, bpy.types.Scene):
+                pass
+
+    def read(
+        self,
+        depsgraph: bpy.types.Depsgraph,
+        *,
+        camera: Camera | None = None,
+        resolution: tuple[int, int] | None = None,
+        keep: bool = False,
+    ) -> Scene:
+        """The Scene of ``depsgraph``. ``camera`` overrides the scene's own; ``resolution`` sets its aspect; with
+        ``keep`` meshes and materials of the last sync are trusted unless :meth:`invalidate` dropped them."""
+        if not keep:
+            self._meshes.clear()
+            self._materials.clear()
+            self._world = None
+        self.counts = {"meshes": 0, "materials": 0}
+        source = depsgraph.scene_eval
+        scene = Scene(name=source.name, frame=source.frame_current)
+        images = ImageTable(self._images, scene.notes)
+        materials = _MaterialIndex(self, images, scene)
+        placed = _Placed()
+        meshes: dict[tuple, int] = {}
+        by_pointer: dict[int, int] = {}
+        used_keys: set[tuple] = set()
+        for instance in depsgraph.object_instances:
+            obj = instance.object
+            if not (instance.show_self or instance.is_instance):
+                continue
+            if obj.type == "LIGHT":
+                light = _read_light(instance, obj, scene.notes)
+                if light is not None:
+                    scene.lights.append(light)
+                continue
+            if obj.type not in _MESH_LIKE:
+                if obj.type in ("CURVES", "POINTCLOUD", "VOLUME", "GREASEPENCIL"):
+                    _note(scene, f"{obj.type.capitalize()} objects are not rendered yet ({obj.name})")
+                continue
+            matrix = np.array(instance.matrix_world, dtype="f8")
+            if not np.isfinite(matrix).all():
+                _note(scene, f"object {obj.name} is left out: its transform is not a number")
+                continue
+            index = self._mesh_index(obj, scene, meshes, by_pointer, used_keys)
+            if index is None:
+                continue
+            slots = [slot.material for slot in obj.material_slots] or list(getattr(obj.data, "materials", []))
+            visibility = _visibility(obj)
+            placed.add(index, matrix, tuple(materials.index(m) for m in slots) or (materials.index(None),),
+                       visibility, instance.random_id / 2**32, obj.pass_index, tuple(obj.color))  # fmt: skip
+        self._meshes = {k: v for k, v in self._meshes.items() if k in used_keys}
+        scene.instances = placed.instances()
+        if self._world is None:
+            self._world = (0, read_world(source.world, images))
+            self._material_images[0] = images.images[:]
+        world = self._world[1]
+        scene.world = world
+        scene.images = images.images
+        scene.camera = camera or _read_camera(source, depsgraph, resolution, scene.notes)
+        return scene
+
+    # -- meshes --------------------------------------------------------------------------------------------------
+
+    def _mesh_index(self, obj, scene: Scene, meshes, by_pointer, used_keys) -> int | None:
+        """Index of the object's evaluated mesh among the scene's; None if it has no triangles."""
+        data = obj.data
+        pointer = data.as_pointer() if data is not None else 0
+        if obj.type == "MESH" and pointer in by_pointer:
+            return by_pointer[pointer]
+        # One object can bring several meshes (Geometry Nodes instances): the data's name tells them apart.
+        key = (obj.original.session_uid, data.name_full if data is not None else "", obj.type)
+        if key in meshes and obj.type != "MESH":
+            return meshes[key]
+        mesh = self._meshes.get(key)
+        if mesh is None:
+            mesh = _read_object_mesh(obj, scene)
+            self.counts["meshes"] += 1
+            if mesh is None:
+                return None
+            self._meshes[key] = mesh
+        used_keys.add(key)
+        if mesh.empty:
+            return None
+        if mesh not in scene.meshes[-1:]:
+            scene.meshes.append(mesh)
+        index = len(scene.meshes) - 1
+        meshes[key] = index
+        if obj.type == "MESH":
+            by_pointer[pointer] = index
+        return index
+
+
+class _MaterialIndex:
+    """Indices of Blender's materials in the scene's list, filled as they are met."""
+
+    def __init__(self, sync: SceneSync, images: ImageTable, scene: Scene) -> None:
+        self.sync, self.images, self.scene = sync, images, scene
+        self._index: dict[int, int] = {}
+
+    def index(self, material: bpy.types.Material | None) -> int:
+        key = material.original.session_uid if material is not None else 0
+        if key not in self._index:
+            self._index[key] = len(self.scene.materials)
+            self.scene.materials.append(self._get(material, key))
+        return self._index[key]
+
+    def _get(self, material, key: int) -> Material:
+        if material is None:
+            return self.sync._default
+        # Graphs refer to images by index, so a kept material is good only while its images keep theirs; reading a
+        # graph is cheap beside reading pixels, which the image cache spares.
+        fresh = read_material(material, self.images)
+        old = self.sync._materials.get(key)
+        if old is not None and old.graph == fresh.graph and self._same_images(old, key):
+            return old
+        self.sync.counts["materials"] += 1
+        self.sync._materials[key] = fresh
+        self.sync._material_images[key] = self._images_of(fresh)
+        return fresh
+
+    def _images_of(self, material: Material) -> list:
+        indices = [n.params["image"] for n in material.graph.nodes if n.params.get("image") is not None]
+        return [(i, self.images.images[i]) for i in indices]
+
+    def _same_images(self, material: Material, key: int) -> bool:
+        return self._images_of(material) == self.sync._material_images.get(key)
+
+
+class _Placed:
+    """Instances being collected."""
+
+    def __init__(self) -> None:
+        self.rows: list[tuple] = []
+
+    def add(self, *row) -> None:
+        self.rows.append(row)
+
+    def instances(self) -> Instances:
+        if not self.rows:
+            return Instances.make([], np.zeros((0, 4, 4)), [])
+        mesh, matrix, materials, visibility, random, index, color = zip(*self.rows, strict=True)
+        return Instances.make(mesh, np.array(matrix), materials, visibility=visibility, random=random, index=index,
+                              color=color)  # fmt: skip
+
+
+def _note(scene: Scene, text: str) -> None:
+    if text not in scene.notes:
+        scene.notes.append(text)
+
+
+def _visibility(obj: bpy.types.Object) -> int:
+    bits = sum(bit for name, bit in _RAYS if getattr(obj, name, True))
+    if obj.is_holdout:
+        bits |= HOLDOUT
+    return bits & (ALL_RAYS | HOLDOUT)
+
+
+def _read_object_mesh(obj: bpy.types.Object, scene: Scene) -> Mesh | None:
+    """The evaluated mesh of an object, whatever it is made from."""
+    if obj.type == "MESH":
+        return read_mesh(obj.data, obj.name)
+    try:
+        mesh = obj.to_mesh()
+    except RuntimeError as error:
+        _note(scene, f"object {obj.name} is left out: {error}")
+        return None
+    if mesh is None:
+        return None
+    try:
+        return read_mesh(mesh, obj.name)
+    finally:
+        obj.to_mesh_clear()
+
+
+def _get(attribute, kind: str, dtype: str, width: int) -> np.ndarray:
+    out = np.empty(len(attribute.data) * width, dtype)
+    attribute.data.foreach_get(kind, out)
+    return out.reshape(-1, width) if width > 1 else out
+
+
+def read_mesh(mesh: bpy.types.Mesh, name: str) -> Mesh:
+    """Triangles with split vertices from a Blender mesh, by the bulk accessors with matching types."""
+    triangle_count = len(mesh.loop_triangles)
+    if triangle_count == 0 and len(mesh.polygons):
+        mesh.calc_loop_triangles()
+        triangle_count = len(mesh.loop_triangles)
+    if triangle_count == 0:
+        return Mesh(name, np.zeros((0, 3), "f4"), np.zeros((0, 3), "f4"), np.zeros((0, 3), "u4"), np.zeros((0, 3), "i8"))
+    attributes = mesh.attributes
+    positions = _get(attributes["position"], "vector", "f4", 3)
+    corner_vertex = _get(attributes[".corner_vert"], "value", "i4", 1)
+    triangles = np.empty(triangle_count * 3, np.uint32)
+    mesh.loop_triangles.foreach_get("loops", triangles)
+    triangles = triangles.reshape(-1, 3)
+    normals = np.empty(len(corner_vertex) * 3, np.float32)
+    mesh.corner_normals.foreach_get("vector", normals)
+    normals = normals.reshape(-1, 3)
+
+    corner: dict[str, np.ndarray] = {}
+    for layer in mesh.uv_layers:
+        attribute = attributes.get(layer.name)
+        if attribute is not None and attribute.domain == "CORNER":
+            corner[f"uv:{layer.name}"] = _get(attribute, "vector", "f4", 2)
+    for attribute in attributes:
+        if attribute.name.startswith(".") or attribute.name == "position" or attribute.name in mesh.uv_layers:
+            continue
+        values = _read_attribute(attribute)
+        if values is None:
+            continue
+        if attribute.domain == "POINT":
+            values = values[corner_vertex]
+        elif attribute.domain == "FACE":
+            per_face = np.empty(triangle_count, np.int32)
+            mesh.loop_triangle_polygons.foreach_get("value", per_face)
+            faces = np.zeros(len(corner_vertex), np.int32)
+            faces[triangles.reshape(-1)] = np.repeat(per_face, 3)
+            values = values[faces]
+        elif attribute.domain != "CORNER":
+            continue
+        color = attribute.data_type in ("FLOAT_COLOR", "BYTE_COLOR")
+        corner[f"{'color' if color else 'attr'}:{attribute.name}"] = values
+
+    positions, normals, corner, triangles = _weld(positions, corner_vertex, normals, corner, triangles)
+    slots, triangles = _by_material(mesh, triangles, triangle_count)
+    render_uv = next((layer.name for layer in mesh.uv_layers if layer.active_render), "")
+    colors = mesh.color_attributes
+    index = colors.render_color_index if len(colors) else -1
+    render_color = colors[index].name if 0 <= index < len(colors) else ""
+    return Mesh(name, positions, normals, triangles, slots, corner, render_uv, render_color)
+
+
+def _read_attribute(attribute: bpy.types.Attribute) -> np.ndarray | None:
+    kinds = {"FLOAT": ("value", "f4", 1), "FLOAT_VECTOR": ("vector", "f4", 3), "FLOAT_COLOR": ("color", "f4", 4),
+             "BYTE_COLOR": ("color", "f4", 4), "FLOAT2": ("vector", "f4", 2), "INT": ("value", "i4", 1),
+             "BOOLEAN": ("value", "?", 1)}  # fmt: skip
+    kind = kinds.get(attribute.data_type)
+    if kind is None or attribute.name in ("material_index", "sharp_face", "sharp_edge"):
+        return None
+    values = _get(attribute, *kind)
+    if values.ndim == 1:
+        values = np.repeat(values[:, None], 3, axis=1)
+    return np.ascontiguousarray(values, np.float32)
+
+
+def _weld(positions, corner_vertex, normals, corner, triangles):
+    """Corners to vertices: all corners of a vertex that agree with its first one share it, the others get their own.
+
+    Linear in time, which a sort of all corners is not; on smooth meshes nearly all agree.
+    """
+    count = len(corner_vertex)
+    first = np.zeros(len(positions), np.int64)
+    first[corner_vertex[::-1]] = np.arange(count - 1, -1, -1)
+    lead = first[corner_vertex]
+    same = np.ones(count, bool)
+    # Normals of one smooth vertex differ by rounding only.
+    same &= (np.abs(normals - normals[lead]) < 1e-5).all(axis=1)
+    for values in corner.values():
+        same &= (values == values[lead]).all(axis=1)
+    used = np.zeros(count, bool)
+    used[triangles.reshape(-1)] = True
+    used[lead[used]] = True
+    keep = np.flatnonzero(used & (~same | (np.arange(count) == lead)))
+    slot = np.full(count, -1, np.int64)
+    slot[keep] = np.arange(len(keep))
+    slot = np.where(same, slot[lead], slot)
+    return (
+        np.ascontiguousarray(positions[corner_vertex[keep]]),
+        np.ascontiguousarray(normals[keep]),
+        {name: np.ascontiguousarray(values[keep]) for name, values in corner.items()},
+        slot[triangles].astype(np.uint32),
+    )
+
+
+def _by_material(mesh, triangles: np.ndarray, triangle_count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Sort triangles by material slot: (slot, first, count) rows and the sorted triangles."""
+    attribute = mesh.attributes.get("material_index")
+    if attribute is None:
+        return np.array([[0, 0, triangle_count]]), triangles
+    per_polygon = _get(attribute, "value", "i4", 1)
+    polygon = np.empty(triangle_count, np.int32)
+    mesh.loop_triangle_polygons.foreach_get("value", polygon)
+    index = np.maximum(per_polygon[polygon], 0)
+    if (index == index[0]).all():
+        return np.array([[int(index[0]), 0, triangle_count]]), triangles
+    order = np.argsort(index, kind="stable")
+    slots, first, counts = np.unique(index[order], return_index=True, return_counts=True)
+    return np.stack([slots, first, counts], axis=1), np.ascontiguousarray(triangles[order])
+
+
+# --- lights and cameras -----------------------------------------------------------------------------------------------
+
+
+def _read_light(instance, obj: bpy.types.Object, notes: list[str]) -> Light | None:
+    """A Light from Blender's, in Cycles' units."""
+    data = obj.data
+    strength = float(data.energy) * 2.0 ** float(getattr(data, "exposure", 0.0))
+    color = np.array(data.color, "f8")
+    if getattr(data, "use_temperature", False):
+        color = color * np.array(data.temperature_color, "f8")
+    if data.use_nodes and data.node_tree is not None:
+        color = color * _light_nodes(data, notes)
+    matrix = np.array(instance.matrix_world, "f8")
+    scale = [float(np.linalg.norm(matrix[:3, k])) for k in range(3)]
+    light = Light(
+        obj.name, data.type, color * strength, matrix,
+        use_shadow=bool(getattr(data, "use_shadow", True)) and bool(getattr(data.cycles, "cast_shadow", True)),
+        visible_camera=bool(obj.visible_camera),
+    )  # fmt: skip
+    if data.type in ("POINT", "SPOT"):
+        light.radius = float(data.shadow_soft_size)
+        light.soft_falloff = bool(getattr(data, "use_soft_falloff", False))
+    if data.type == "SPOT":
+        light.spot_size, light.spot_blend = float(data.spot_size), float(data.spot_blend)
+    if data.type == "SUN":
+        light.angle = float(data.angle)
+    if data.type == "AREA":
+        light.shape = data.shape
+        light.size = (float(data.size), float(data.size_y if data.shape in ("RECTANGLE", "ELLIPSE") else data.size))
+        light.spread = float(getattr(data, "spread", math.pi))
+    if not getattr(data, "normalize", True):
+        light.emission = light.emission * _light_area(light, scale)
+    return light
+
+
+def _light_area(light: Light, scale: list[float]) -> float:
+    """What Cycles would have divided by: power per area (area, point, spot) or per solid-angle disc (sun)."""
+    if light.kind == "SUN":
+        return math.pi * math.sin(0.5 * light.angle) ** 2 if light.angle > 0 else 1.0
+    if light.kind == "AREA":
+        area = light.size[0] * scale[0] * light.size[1] * scale[1]
+        return area * (math.pi / 4.0 if light.shape in ("DISK", "ELLIPSE") else 1.0)
+    return math.pi * light.radius**2 * 4.0 if light.radius > 0 else 1.0
+
+
+def _light_nodes(data: bpy.types.Light, notes: list[str]) -> np.ndarray:
+    """Colour × strength of an Emission node; anything else counts as 1 with a note."""
+    tree = data.node_tree
+    output = next((n for n in tree.nodes if n.type == "OUTPUT_LIGHT" and not n.mute), None)
+    if output is None or not output.inputs["Surface"].is_linked:
+        return np.zeros(3) if output is not None else np.ones(3)
+    node = output.inputs["Surface"].links[0].from_node
+    if node.type != "EMISSION" or node.inputs["Color"].is_linked or node.inputs["Strength"].is_linked:
+        notes.append(f"light {data.name}: its nodes are not evaluated, its colour and power alone count")
+        return np.ones(3)
+    return np.array(node.inputs["Color"].default_value[:3], "f8") * float(node.inputs["Strength"].default_value)
+
+
+def _read_camera(
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, resolution: tuple[int, int] | None, notes: list[str]
+) -> Camera | None:
+    obj = scene.camera
+    if obj is None or obj.type != "CAMERA":
+        return None
+    render = scene.render
+    width, height = resolution or (render.resolution_x, render.resolution_y)
+    projection = obj.calc_matrix_camera(
+        depsgraph, x=width, y=height, scale_x=render.pixel_aspect_x, scale_y=render.pixel_aspect_y
+    )
+    # The camera's own scale does not zoom: only its place and turn count.
+    location, rotation, _ = obj.matrix_world.decompose()
+    matrix = np.eye(4)
+    matrix[:3, :3] = np.array(rotation.to_matrix())
+    matrix[:3, 3] = location
+    data = obj.data
+    if data.type == "PANO":
+        notes.append(f"camera {obj.name} is panoramic, which a rasteriser has no projection for; it renders as its "
+                     "perspective lens")  # fmt: skip
+    return Camera(matrix, np.array(projection, "f8"), float(data.clip_start), float(data.clip_end), name=obj.name)

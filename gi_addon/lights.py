@@ -1,0 +1,414 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Lights as one point each per sub-frame, and the maps that show what that point sees.
+
+A light with an extent (sun disc, sphere, area, emissive mesh, world) is another point of itself in every sub-frame, by
+the low-discrepancy sequence. Averaged over sub-frames that gives soft shadows and area light without a method of its
+own; with one sub-frame every light is its centre.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from . import atlas
+from .gpu_types import (
+    LIGHT,
+    LIGHT_AREA,
+    LIGHT_FLAG_BOUNCE,
+    LIGHT_FLAG_SHADOW,
+    LIGHT_MESH,
+    LIGHT_POINT,
+    LIGHT_SPOT,
+    LIGHT_SUN,
+    LIGHT_VIEW,
+    LIGHT_WORLD,
+    SHAPE_ELLIPSE,
+    SHAPE_RECTANGLE,
+)
+from .scene import Light
+from .sequence import sobol_2d
+from .world_map import WorldMap
+
+# A single perspective map serves spots up to this full angle; its edge texels then see 4 × the solid angle share
+# of the centre's, (1 + tan²)^1.5 at 60°/2 … beyond it the cube's faces are the better map.
+_WIDEST_SINGLE_VIEW = np.radians(120.0)
+# Nearest distance a light's map shows, as a share of the farthest: a 24-bit depth buffer then resolves 1/16000 there.
+_NEAR_SHARE = 1e-3
+# Texels around a shadow tile that its filter may read: bilinear footprint plus one.
+_GUARD_TEXELS = 2.0
+
+_FACES = np.array([
+    # axis_x, axis_y, axis_z of the six faces; the first is +z, and the first five face the upper half space.
+    [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
+    [[0, 1, 0], [0, 0, 1], [1, 0, 0]],
+    [[0, 1, 0], [0, 0, 1], [-1, 0, 0]],
+    [[1, 0, 0], [0, 0, 1], [0, 1, 0]],
+    [[1, 0, 0], [0, 0, 1], [0, -1, 0]],
+    [[1, 0, 0], [0, 1, 0], [0, 0, -1]],
+], "f8")  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Emitters:
+    """Emissive triangles of the scene: corners (T, 3, 3) world space, radiance (T, 3) W/(m²·sr) from both sides."""
+
+    corners: np.ndarray
+    radiance: np.ndarray
+
+    @staticmethod
+    def none() -> Emitters:
+        return Emitters(np.zeros((0, 3, 3)), np.zeros((0, 3)))
+
+    def __len__(self) -> int:
+        return len(self.corners)
+
+    def areas(self) -> np.ndarray:
+        """Triangle areas (T,), m²."""
+        a = self.corners[:, 1] - self.corners[:, 0]
+        b = self.corners[:, 2] - self.corners[:, 0]
+        return 0.5 * np.linalg.norm(np.cross(a, b), axis=1)
+
+
+@dataclass
+class Source:
+    """Something that shines: a Light, a share of the world, or of the emissive meshes."""
+
+    kind: int
+    seed: int
+    light: Light | None = None
+    views: int = 0
+    soft: bool = False
+    # World and meshes: this source draws points `index` of every `count` per sub-frame.
+    index: int = 0
+    count: int = 1
+
+
+@dataclass
+class Maps:
+    """Tiles of all sources' views in one atlas."""
+
+    sizes: list[int]
+    corners: list[tuple[int, int]]
+    size: tuple[int, int]
+    first: list[int]  # per source, into the tile list; -1 without views
+
+
+@dataclass
+class Sample:
+    """All sources at one sub-frame: ``lights`` (LIGHT), ``views`` (LIGHT_VIEW) and their ``clip_from_world``."""
+
+    lights: np.ndarray
+    views: np.ndarray
+    clip_from_world: np.ndarray
+
+
+@dataclass
+class LightRig:
+    """The scene's sources, where their shadow and bounce maps lie, and what they are at a sub-frame."""
+
+    sources: list[Source]
+    bounds: np.ndarray
+    world: WorldMap | None
+    emitters: Emitters
+    shadow: Maps
+    bounce: Maps
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def soft(self) -> bool:
+        """Whether shadow maps differ between sub-frames."""
+        return any(s.soft and s.views for s in self.sources)
+
+    @property
+    def bounce_soft(self) -> bool:
+        """Whether bounce maps differ between sub-frames. Discs and spheres bounce from their centre."""
+        return any(s.soft and s.views and s.kind in (LIGHT_AREA, LIGHT_MESH, LIGHT_WORLD) for s in self.sources)
+
+    def sample(self, subframe: int, subframes: int, maps: Maps, *, bounce: bool) -> Sample:
+        """Every source's point at ``subframe`` of ``subframes``, with views into ``maps``."""
+        lights = np.zeros(len(self.sources), LIGHT)
+        views: list[np.ndarray] = []
+        clips: list[np.ndarray] = []
+        for i, source in enumerate(self.sources):
+            centred = subframes == 1 or (bounce and source.kind in (LIGHT_SUN, LIGHT_POINT, LIGHT_SPOT))
+            if source.kind in (LIGHT_WORLD, LIGHT_MESH):
+                u = sobol_2d(subframe * source.count + source.index, source.seed)
+            else:
+                u = np.array([0.5, 0.5]) if centred else sobol_2d(subframe, source.seed)
+            self._place(lights[i], source, u, 1 if bounce else subframes)
+            lights[i]["first_view"] = maps.first[i]
+            if maps.first[i] < 0:
+                lights[i]["views"] = 0
+                continue
+            for face, (rows, perspective) in enumerate(self._faces(lights[i], source)):
+                tile = maps.first[i] + face
+                view = np.zeros((), LIGHT_VIEW)
+                guard = 1.0 if bounce else 1.0 + 2.0 * _GUARD_TEXELS / maps.sizes[tile]
+                clips.append(self._fill_view(view, lights[i], rows, perspective, guard))
+                view["rect"] = (*maps.corners[tile], maps.sizes[tile], maps.sizes[tile])
+                view["light"] = i
+                views.append(view)
+        return Sample(
+            lights,
+            np.array(views, LIGHT_VIEW) if views else np.zeros(0, LIGHT_VIEW),
+            np.array(clips, "f4").reshape(-1, 4, 4),
+        )
+
+    # -- sources -------------------------------------------------------------------------------------------------
+
+    def _place(self, out: np.ndarray, source: Source, u: np.ndarray, subframes: int) -> None:
+        out["kind"] = source.kind
+        out["views"] = source.views
+        out["flags"] = LIGHT_FLAG_BOUNCE
+        light = source.light
+        if source.kind == LIGHT_WORLD:
+            direction, weight, pdf = self.world.sample(u[None])
+            out["axis_ws"] = -direction[0]
+            out["emission"] = weight[0] / source.count
+            out["patch_radius"] = np.sqrt(1.0 / (np.pi * max(pdf[0], 1e-12) * source.count * subframes))
+            out["flags"] |= LIGHT_FLAG_SHADOW
+            out["position_ws"] = out["center_ws"] = self.bounds.mean(axis=0)
+            return
+        if source.kind == LIGHT_MESH:
+            self._place_on_mesh(out, source, u, subframes)
+            return
+        matrix = light.matrix
+        center = matrix[:3, 3]
+        x, y, z = (_unit(matrix[:3, k]) for k in range(3))
+        out["axis_ws"], out["u_ws"], out["v_ws"] = -z, x, y
+        out["position_ws"] = out["center_ws"] = center
+        out["emission"] = light.emission
+        out["flags"] |= LIGHT_FLAG_SHADOW if light.use_shadow else 0
+        disc = _disc(u)
+        share = 1.0 / np.sqrt(subframes)
+        if source.kind == LIGHT_SUN:
+            half = 0.5 * light.angle
+            # Uniform over the solid angle of the disc: z uniform in [cos half, 1].
+            cos = 1.0 - (1.0 - np.cos(half)) * float(disc @ disc)
+            radius = np.linalg.norm(disc)
+            planar = disc / radius * np.sqrt(max(0.0, 1.0 - cos * cos)) if radius > 0 else disc
+            out["axis_ws"] = -_unit(planar[0] * x + planar[1] * y + cos * z)
+            out["patch_radius"] = half * share
+            return
+        if source.kind in (LIGHT_POINT, LIGHT_SPOT):
+            out["emission"] = light.emission / (4.0 * np.pi)
+            out["patch_radius"] = light.radius * share
+            if light.radius > 0.0 and (disc != 0).any():
+                # Cycles shows soft lights as a disc facing the shaded point. One point serves all points here, so it
+                # is drawn from the ball whose projection onto any plane has the disc's spread about its centre: the
+                # sphere of radius r √3/2 has variance r²/4 per axis, as the disc has.
+                out["position_ws"] = center + light.radius * np.sqrt(0.75) * _sphere(u)
+            if source.kind == LIGHT_SPOT:
+                cos = np.cos(0.5 * light.spot_size)
+                out["spot_cos"] = cos
+                out["spot_scale"] = 1.0 / max((1.0 - cos) * light.spot_blend, 1e-6)
+                # A scaled spot shines through an ellipse: directions are measured in its own, scaled, frame.
+                scale = np.array([np.linalg.norm(matrix[:3, k]) for k in range(3)])
+                scale = np.where(scale > 0, scale, 1.0)
+                out["u_ws"], out["v_ws"] = x * scale[2] / scale[0], y * scale[2] / scale[1]
+            return
+        # Area: width and height come with the object's scale.
+        size_u, size_v = light.size[0] * np.linalg.norm(matrix[:3, 0]), light.size[1] * np.linalg.norm(matrix[:3, 1])
+        ellipse = light.shape in ("DISK", "ELLIPSE")
+        area = size_u * size_v * (np.pi / 4.0 if ellipse else 1.0)
+        half_spread = 0.5 * min(max(light.spread, 0.0), np.pi)
+        out["shape"] = SHAPE_ELLIPSE if ellipse else SHAPE_RECTANGLE
+        out["u_ws"], out["v_ws"] = x * size_u, y * size_v
+        offset = 0.5 * disc if ellipse else u - 0.5
+        out["position_ws"] = center + out["u_ws"] * offset[0] + out["v_ws"] * offset[1]
+        # Radiance Φ/(πA) × area: intensity on the axis. The spread's profile is normalised to keep Φ.
+        out["emission"] = light.emission / np.pi
+        out["spread_tan"], out["spread_scale"] = spread_profile(half_spread)
+        out["patch_radius"] = np.sqrt(max(area, 0.0) / np.pi) * share
+
+    def _place_on_mesh(self, out: np.ndarray, source: Source, u: np.ndarray, subframes: int) -> None:
+        areas = self.emitters.areas()
+        power = areas * (self.emitters.radiance @ np.array([0.2126, 0.7152, 0.0722]))
+        cdf = np.cumsum(power) / power.sum()
+        index = int(np.searchsorted(cdf, u[0], side="right").clip(0, len(cdf) - 1))
+        low = cdf[index - 1] if index else 0.0
+        # The rest of the number that chose the triangle is as good as new.
+        first = np.sqrt((u[0] - low) / max(cdf[index] - low, 1e-12))
+        a, b, c = self.emitters.corners[index]
+        out["position_ws"] = out["center_ws"] = a * (1.0 - first) + b * first * (1.0 - u[1]) + c * first * u[1]
+        normal = _unit(np.cross(b - a, c - a))
+        frame = _frame(normal)
+        out["axis_ws"], out["u_ws"], out["v_ws"] = normal, frame[0], frame[1]
+        probability = power[index] / power.sum()
+        share = areas[index] / (probability * source.count)
+        out["emission"] = self.emitters.radiance[index] * share
+        out["spread_tan"], out["spread_scale"] = spread_profile(0.5 * np.pi)
+        out["flags"] |= LIGHT_FLAG_SHADOW
+        out["patch_radius"] = np.sqrt(share / (np.pi * subframes))
+
+    # -- views ---------------------------------------------------------------------------------------------------
+
+    def _faces(self, light: np.ndarray, source: Source):
+        """(axis_x, axis_y, axis_z) rows and perspective of each of a source's views."""
+        if source.kind in (LIGHT_SUN, LIGHT_WORLD):
+            z = light["axis_ws"].astype("f8")
+            x, y = _frame(z)
+            yield np.stack([x, y, z]), False
+        elif source.kind == LIGHT_SPOT and source.views == 1:
+            rotation = np.stack([_unit(light["u_ws"]), _unit(light["v_ws"]), _unit(light["axis_ws"])]).astype("f8")
+            # The scaled frame of u and v is narrower in the world where it is longer.
+            tan = np.sqrt(max(1.0 / light["spot_cos"] ** 2 - 1.0, 1e-12))
+            rotation[0] *= tan / max(np.linalg.norm(light["u_ws"]), 1e-6)
+            rotation[1] *= tan / max(np.linalg.norm(light["v_ws"]), 1e-6)
+            yield rotation, True
+        else:
+            if source.kind == LIGHT_POINT:
+                basis = np.eye(3)
+            else:
+                z = light["axis_ws"].astype("f8")
+                x, y = _frame(z)
+                basis = np.stack([x, y, z])
+            for face in _FACES[: source.views]:
+                yield face @ basis, True
+
+    def _fill_view(self, view, light, rows: np.ndarray, perspective: bool, guard: float) -> np.ndarray:
+        """Fill a LIGHT_VIEW; returns its clip_from_world (4, 4) for drawing into the guarded tile."""
+        low, high = self.bounds
+        center, half = (low + high) / 2.0, (high - low) / 2.0
+        rows = rows.copy()
+        if perspective:
+            origin = light["position_ws"].astype("f8")
+            far = float(np.linalg.norm(np.abs(origin - center) + half)) * 1.001
+            nearest = float(np.linalg.norm(np.maximum(np.abs(origin - center) - half, 0.0)))
+            near = max(_NEAR_SHARE * far, 0.5 * nearest / np.sqrt(3.0))
+            far = max(far, near * 2.0, 1e-12)
+        else:
+            extent = np.abs(rows) @ half * 1.001 + 1e-9 * (1.0 + np.abs(center).max())
+            middle = rows @ center
+            origin = rows.T @ np.array([middle[0], middle[1], middle[2] - extent[2]])
+            rows[0] *= extent[0]
+            rows[1] *= extent[1]
+            near, far = 0.0, float(2.0 * extent[2])
+        view["origin_ws"], view["perspective"] = origin, float(perspective)
+        view["axis_x"], view["axis_y"], view["axis_z"] = rows
+        view["near"], view["far"], view["guard"] = near, far, guard
+        clip = np.zeros((4, 4))
+        for k in range(2):
+            clip[k, :3] = rows[k] / (rows[k] @ rows[k]) / guard
+        depth = np.append(rows[2], -rows[2] @ origin)
+        clip[:2, 3] = -clip[:2, :3] @ origin
+        if perspective:
+            clip[2] = depth * (far + near) / (far - near)
+            clip[2, 3] -= 2.0 * far * near / (far - near)
+            clip[3] = depth
+        else:
+            clip[2] = depth * 2.0 / (far - near)
+            clip[2, 3] -= (far + near) / (far - near)
+            clip[3, 3] = 1.0
+        return clip
+
+
+def spread_profile(half_spread: float) -> tuple[float, float]:
+    """(tan, scale) of an area light's spread: radiance × max(tan − tanθ, 0) · scale, of the same flux as without.
+
+    ∫ cosθ (1 − tanθ/t) dω over the cone is π (1 − a/tan a) for half angle a, whence scale = 1/(t − a); half a turn is
+    no spread at all, written as tan = −1.
+    """
+    if half_spread >= 0.5 * np.pi - 1e-4:
+        return -1.0, 1.0
+    half_spread = max(half_spread, np.radians(0.5))  # Blender's least spread is 1°
+    tan = np.tan(half_spread)
+    return float(tan), float(1.0 / (tan - half_spread))
+
+
+def build_rig(
+    lights: list[Light],
+    bounds: np.ndarray,
+    *,
+    world: WorldMap | None,
+    world_samples: int,
+    emitters: Emitters,
+    emitter_samples: int,
+    area_lights: bool,
+    shadow_resolution: int,
+    bounce_resolution: int,
+    world_resolution: int,
+    texel_budget: int = 1 << 25,
+) -> LightRig:
+    """Collect what shines and lay out its maps. Lights without power, or with a broken transform, are left out with a
+    note."""
+    sources: list[Source] = []
+    notes: list[str] = []
+    for index, light in enumerate(lights):
+        if not np.isfinite(light.matrix).all() or not np.isfinite(light.emission).all():
+            notes.append(f"light {light.name} is left out: its transform or power is not a number")
+            continue
+        if not (np.asarray(light.emission) != 0.0).any():
+            continue
+        seed = 100 + index
+        if light.kind == "SUN":
+            sources.append(Source(LIGHT_SUN, seed, light, 1, light.angle > 0.0))
+        elif light.kind == "POINT":
+            sources.append(Source(LIGHT_POINT, seed, light, 6, light.radius > 0.0))
+        elif light.kind == "SPOT":
+            single = light.spot_size <= _WIDEST_SINGLE_VIEW
+            sources.append(Source(LIGHT_SPOT, seed, light, 1 if single else 5, light.radius > 0.0))
+        elif light.kind == "AREA" and area_lights:
+            sources.append(Source(LIGHT_AREA, seed, light, 5, True))
+    if world is not None and not world.black:
+        sources += [Source(LIGHT_WORLD, 11, None, 1, True, k, world_samples) for k in range(world_samples)]
+    if len(emitters) and area_lights:
+        sources += [Source(LIGHT_MESH, 12, None, 6, True, k, emitter_samples) for k in range(emitter_samples)]
+
+    def tiles(resolution: int, used) -> Maps:
+        sizes: list[int] = []
+        first: list[int] = []
+        for source in sources:
+            if not used(source):
+                first.append(-1)
+                continue
+            first.append(len(sizes))
+            base = min(resolution, world_resolution) if source.kind == LIGHT_WORLD else resolution
+            size = base if source.views == 1 else base // 2
+            sizes += [max(16, size)] * source.views
+        while sum(s * s for s in sizes) > texel_budget and max(sizes) > 16:
+            sizes = [max(16, s // 2) for s in sizes]
+        corners, size = atlas.pack(sizes, power_of_two=True)
+        return Maps(sizes, corners, size, first)
+
+    return LightRig(
+        sources, bounds, world, emitters,
+        tiles(shadow_resolution, lambda s: s.light is None or s.light.use_shadow),
+        tiles(bounce_resolution, lambda s: True),
+        notes,
+    )  # fmt: skip
+
+
+def _unit(v: np.ndarray) -> np.ndarray:
+    v = np.asarray(v, "f8")
+    length = np.linalg.norm(v)
+    return v / length if length > 0 else np.array([0.0, 0.0, 1.0])
+
+
+def _frame(z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Two unit vectors across z; a frame that follows z without a seam in the half space where lights point."""
+    z = _unit(z)
+    helper = np.array([1.0, 0.0, 0.0]) if abs(z[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
+    x = _unit(helper - z * (helper @ z))
+    return x, np.cross(z, x)
+
+
+def _disc(u: np.ndarray) -> np.ndarray:
+    """Concentric map of the unit square to the unit disc; (½, ½) is the centre."""
+    p = 2.0 * np.asarray(u) - 1.0
+    if p[0] == 0.0 and p[1] == 0.0:
+        return np.zeros(2)
+    if abs(p[0]) > abs(p[1]):
+        r, phi = p[0], np.pi / 4.0 * p[1] / p[0]
+    else:
+        r, phi = p[1], np.pi / 2.0 - np.pi / 4.0 * p[0] / p[1]
+    return r * np.array([np.cos(phi), np.sin(phi)])
+
+
+def _sphere(u: np.ndarray) -> np.ndarray:
+    """Uniform on the unit sphere."""
+    z = 1.0 - 2.0 * u[1]
+    r = np.sqrt(max(0.0, 1.0 - z * z))
+    return np.array([r * np.cos(2 * np.pi * u[0]), r * np.sin(2 * np.pi * u[0]), z])

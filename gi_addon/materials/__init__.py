@@ -1,0 +1,6 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Shader graphs to GLSL: a material is one generated function that every pass drawing surfaces includes."""
+
+from .compiler import CompiledGraph, compile_surface, compile_world
+
+__all__ = ["CompiledGraph", "compile_surface", "compile_world"]

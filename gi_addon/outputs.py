@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The passes written, with Blender's names and Cycles' meanings, and the film layers they are made of.
+
+A light pass is light without the surface's colour: the film adds light × colour and colour over the sub-frames, and the
+pass is their ratio, as in Cycles. So Combined is exactly Σ light × colour + emission + environment.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Output:
+    """A pass: Blender's ``name``, ``channels`` (as in ``register_pass``), socket ``kind``, the view layer's ``flag``,
+    the film ``layers`` it needs, and ``divide``: the layer of colour that its light is divided by."""
+
+    name: str
+    channels: str
+    kind: str
+    flag: str
+    layers: tuple[str, ...]
+    divide: str | None = None
+
+
+def _light(name: str, flag: str, layer: str, color: str) -> Output:
+    return Output(name, "RGB", "COLOR", flag, (layer, color), color)
+
+
+OUTPUTS: dict[str, Output] = {
+    o.name: o
+    for o in (
+        Output("Combined", "RGBA", "COLOR", "use_pass_combined", ("combined",)),
+        Output("Depth", "Z", "VALUE", "use_pass_z", ("depth",)),
+        Output("Normal", "XYZ", "VECTOR", "use_pass_normal", ("normal",)),
+        _light("Diffuse Direct", "use_pass_diffuse_direct", "diffuse_direct", "diffuse_color"),
+        _light("Diffuse Indirect", "use_pass_diffuse_indirect", "diffuse_indirect", "diffuse_color"),
+        Output("Diffuse Color", "RGB", "COLOR", "use_pass_diffuse_color", ("diffuse_color",)),
+        _light("Glossy Direct", "use_pass_glossy_direct", "glossy_direct", "glossy_color"),
+        _light("Glossy Indirect", "use_pass_glossy_indirect", "glossy_indirect", "glossy_color"),
+        Output("Glossy Color", "RGB", "COLOR", "use_pass_glossy_color", ("glossy_color",)),
+        _light("Transmission Direct", "use_pass_transmission_direct", "transmission_direct", "transmission_color"),
+        _light("Transmission Indirect", "use_pass_transmission_indirect", "transmission_indirect",
+               "transmission_color"),
+        Output("Transmission Color", "RGB", "COLOR", "use_pass_transmission_color", ("transmission_color",)),
+        Output("Volume Direct", "RGB", "COLOR", "cycles.use_pass_volume_direct", ("volume_direct",)),
+        Output("Emission", "RGB", "COLOR", "use_pass_emit", ("emission",)),
+        Output("Environment", "RGB", "COLOR", "use_pass_environment", ("environment",)),
+        Output("Ambient Occlusion", "RGB", "COLOR", "use_pass_ambient_occlusion", ("ao",)),
+        Output("Shadow", "RGB", "COLOR", "use_pass_shadow", ("shadow",)),
+    )
+}  # fmt: skip
+
+# Film layers and the graph resources that feed each. A layer whose resources are all absent stays black: there is no
+# such light in the scene.
+LAYERS: dict[str, tuple[str, ...]] = {
+    "combined": (
+        "gbuffer.depth", "gbuffer.diffuse", "gbuffer.emission", "direct.diffuse", "direct.glossy", "indirect.diffuse",
+    ),
+    "depth": ("gbuffer.depth",),
+    "normal": ("gbuffer.depth", "gbuffer.normal"),
+    "diffuse_direct": ("gbuffer.depth", "gbuffer.diffuse", "direct.diffuse"),
+    "diffuse_indirect": ("gbuffer.depth", "gbuffer.diffuse", "indirect.diffuse"),
+    "diffuse_color": ("gbuffer.depth", "gbuffer.diffuse"),
+    "glossy_direct": ("gbuffer.depth", "direct.glossy"),
+    "glossy_indirect": ("gbuffer.depth",),
+    "glossy_color": ("gbuffer.depth", "gbuffer.normal", "gbuffer.specular", "gbuffer.lobe", "brdf.albedo"),
+    "transmission_direct": ("gbuffer.depth",),
+    "transmission_indirect": ("gbuffer.depth",),
+    "transmission_color": ("gbuffer.depth",),
+    "volume_direct": ("gbuffer.depth",),
+    "emission": ("gbuffer.depth", "gbuffer.emission"),
+    "environment": ("gbuffer.depth",),
+    "ao": ("gbuffer.depth", "ao"),
+    "shadow": ("gbuffer.depth", "direct.shadow"),
+}  # fmt: skip
+
+
+def film_layers(outputs: Iterable[str]) -> tuple[str, ...]:
+    """Film layers needed for ``outputs``, in a fixed order."""
+    needed = {layer for name in outputs for layer in OUTPUTS[name].layers}
+    return tuple(layer for layer in LAYERS if layer in needed)
+
+
+def develop(film: Mapping[str, np.ndarray], outputs: Iterable[str]) -> dict[str, np.ndarray]:
+    """Passes (H, W, channels) f4 from film layers (H, W, 4), already averaged over the sub-frames."""
+    result: dict[str, np.ndarray] = {}
+    for name in outputs:
+        output = OUTPUTS[name]
+        value = film[output.layers[0]][..., : len(output.channels)]
+        if output.divide:
+            color = film[output.divide][..., :3]
+            value = np.divide(value, color, out=np.zeros_like(value), where=color > 0.0)
+        result[name] = np.ascontiguousarray(value, np.float32)
+    return result

@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Ambient occlusion from the depth buffer, and its blur."""
+
+from __future__ import annotations
+
+from ..facts import Facts
+from ..frame import Frame
+from ..graph import Pass, Planned, Texture, Uniform
+from .gbuffer import _screen
+
+
+class AOGeneration(Pass):
+    title = "AO Generation"
+    figure = "RSM AO Generation / SSAO Generation"
+    reads = ("gbuffer.depth", "gbuffer.normal")
+    writes = (
+        Texture("ao.raw", "ao_raw", "cosine-weighted share of directions free of occluders: within the AO distance; "
+                "and near by, fading with distance", "rg16f", _screen, scratch=True),
+    )  # fmt: skip
+    uniforms = (
+        Uniform("ao_directions", "int", "directions per pixel"),
+        Uniform("ao_steps", "int", "depth tests along each"),
+        Uniform("ao_distance", "float", "how far an occluder counts, m"),
+        Uniform("ao_contact", "float", "how far one dims untested indirect light, m"),
+    )
+    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "passes/ao_frag.glsl"}}
+
+    def absent(self, facts: Facts) -> str | None:
+        return None if facts.settings.use_ao else "ambient occlusion is switched off"
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        program = frame.program(planned)
+        facts = planned.facts
+        frame.set(
+            program,
+            ao_directions=facts.settings.ao.samples,
+            ao_steps=facts.settings.ao.steps,
+            # Nothing of the scene is farther than its own diameter.
+            ao_distance=min(facts.ao_distance, 2.0 * facts.radius),
+            ao_contact=facts.settings.ao.contact * facts.radius,
+        )
+        frame.screen(planned, program)
+
+
+class AOBlur(Pass):
+    title = "Gaussian Blur"
+    figure = "Gaussian Blur"
+    reads = ("ao.raw", "gbuffer.depth", "gbuffer.normal")
+    writes = (
+        Texture("ao", "ao", "ambient occlusion within the AO distance; and of near contacts; 1 = open", "rg16f",
+                _screen, scratch=True),
+    )  # fmt: skip
+    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "passes/ao_blur_frag.glsl"}}
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        frame.screen(planned, frame.program(planned))

@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Light that reaches a surface straight from its source."""
+
+from __future__ import annotations
+
+from ..facts import Facts
+from ..frame import Frame
+from ..graph import Optional, Pass, Planned, Texture, Uniform
+from ..sequence import sobol_2d
+from .gbuffer import _screen
+
+
+class DirectLighting(Pass):
+    title = "Direct Lighting Computation"
+    figure = "Direct Lighting Computation"
+    reads = (
+        "lights", Optional("lights.views"), Optional("shadow.depth"), "gbuffer.depth", "gbuffer.normal",
+        Optional("gbuffer.specular", ("direct.glossy",)), Optional("gbuffer.lobe", ("direct.glossy",)),
+        Optional("brdf.energy", ("direct.glossy",)), Optional("brdf.average", ("direct.glossy",)),
+    )  # fmt: skip
+    writes = (
+        Texture("direct.diffuse", "direct_diffuse", "radiance a white Lambert surface would reflect, W/(m²·sr)",
+                "rgba32f", _screen, when=lambda f: None if f.diffuse else "no visible material is diffuse"),
+        Texture("direct.glossy", "direct_glossy", "radiance reflected by the glossy lobe, W/(m²·sr)", "rgba32f",
+                _screen, when=lambda f: None if f.glossy else "no visible material is glossy"),
+        Texture("direct.shadow", "direct_shadow", "share of the direct irradiance that is not blocked", "rgba16f",
+                _screen),
+    )  # fmt: skip
+    uniforms = (
+        Uniform("light_count", "int", "lights in the list"),
+        Uniform("softness", "float", "radius of the shadow filter, texels"),
+        Uniform("filter_turn", "float", "rotation of the shadow filter in this sub-frame, rad"),
+    )
+    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "passes/direct_lighting_frag.glsl"}}
+
+    def absent(self, facts: Facts) -> str | None:
+        return None if facts.lit else "no light shines"
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        program = frame.program(planned)
+        frame.set(
+            program,
+            light_count=len(planned.facts.rig.sources),
+            softness=planned.facts.settings.shadows.softness,
+            filter_turn=float(sobol_2d(frame.subframe, 3)[0]) * 1.5707963,
+        )
+        frame.screen(planned, program)

@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the camera sees: the G-buffer and its low-resolution level."""
+
+from __future__ import annotations
+
+import moderngl
+import numpy as np
+
+from ..facts import Facts
+from ..frame import Frame
+from ..graph import Optional, Pass, Planned, Texture
+from ..scene import CAMERA
+
+BACKGROUND_DEPTH = 0.0  # no surface: view depths are positive
+
+
+def _screen(facts: Facts) -> tuple[int, int]:
+    return facts.resolution
+
+
+def gather_size(facts: Facts) -> tuple[int, int]:
+    """Texels of the low-resolution gather: the blocks that cover the picture wherever their grid starts."""
+    scale = facts.settings.rsm.gather_scale
+    return tuple(-(-(n + scale - 1) // scale) for n in facts.resolution)
+
+
+class GBuffer(Pass):
+    title = "G-buffers Generation"
+    figure = "G-buffers Generation"
+    reads = (Optional("brdf.albedo"),)
+    writes = (
+        Texture("gbuffer.depth", "gbuf_depth", "view depth, world units; 0 where nothing is", "r32f", _screen,
+                scratch=True),
+        Texture("gbuffer.normal", "gbuf_normal", "shading normal and triangle's normal, world space, octahedral",
+                "rgba16", _screen),
+        Texture("gbuffer.diffuse", "gbuf_diffuse", "diffuse albedo", "rgba16f", _screen,
+                when=lambda f: None if f.diffuse else "no visible material is diffuse"),
+        Texture("gbuffer.specular", "gbuf_specular", "reflectance F0 of the glossy lobe; roughness", "rgba16f", _screen,
+                when=lambda f: None if f.glossy else "no visible material is glossy"),
+        Texture("gbuffer.lobe", "gbuf_lobe", "index of refraction or curve; F90; multiple scattering", "rgba16f",
+                _screen, when=lambda f: None if f.glossy else "no visible material is glossy"),
+        Texture("gbuffer.emission", "gbuf_emission", "emitted radiance, W/(m²·sr)", "rgba32f", _screen,
+                when=lambda f: None if f.emissive else "no visible material emits"),
+        Texture("gbuffer.z", "gbuf_z", "depth buffer", "depth24", _screen, scratch=True),
+    )  # fmt: skip
+
+    def absent(self, facts: Facts) -> str | None:
+        return None if facts.visible else "the camera has no surface to see"
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        fbo = frame.targets(planned)
+        fbo.use()
+        fbo.scissor = None
+        fbo.viewport = (0, 0, *fbo.size)
+        fbo.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
+        frame.gl.ctx.enable_only(moderngl.DEPTH_TEST)
+        frame.bind(planned)
+        frame.gpu.bind_params()
+        frame.gpu.draw(
+            planned,
+            {"vertex": "surface/surface_vert.glsl", "fragment": "passes/gbuffer_frag.glsl"},
+            CAMERA,
+            np.ascontiguousarray(frame.view["clip_from_world"]),
+            full=True,
+            units=len(planned.texture_reads()),
+            defines={
+                "SURFACE_TABLES": int(planned.has("brdf.albedo")), "SURFACE_SEE_THROUGH_GLASS": 1, "SURFACE_SEEN_BY_CAMERA": 1,
+                "SURFACE_SEEN_BY_SHADOW": 0,
+            },
+        )  # fmt: skip
+
+
+class GBufferMips(Pass):
+    """One representative pixel per block, for passes at low resolution.
+
+    Averages of positions and normals across an edge belong to no surface; a pixel does. Blocks take their nearest and
+    their farthest surface by turns, so that both sides of an edge have a neighbour to interpolate from.
+    """
+
+    title = "G-buffers Mipmap Generation"
+    figure = "G-buffers Mipmap Generation"
+    reads = ("gbuffer.depth", "gbuffer.normal")
+    writes = (
+        Texture("gbuffer.low_depth", "low_depth", "view depth of the block's pixel, world units", "r32f", gather_size,
+                scratch=True),
+        Texture("gbuffer.low_normal", "low_normal", "its normals, as in gbuffer.normal", "rgba16", gather_size,
+                scratch=True),
+        Texture("gbuffer.low_pixel", "low_pixel", "its place in the block, (x + ½, y + ½) / scale", "rg8", gather_size,
+                scratch=True),
+    )  # fmt: skip
+    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "passes/gbuffer_mips_frag.glsl"}}
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return {"GATHER_SCALE": facts.settings.rsm.gather_scale}
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        frame.screen(planned, frame.program(planned))

@@ -1,0 +1,273 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Every setting, declared once. Blender's panels, the command line, the bench and the docs are generated from here.
+
+A setting says what it is, its range and unit, and what more and less of it do. A test changes each one and looks for a
+change in the picture or in the plan: there are no dead knobs.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+_META = "quartet"
+
+
+class SettingError(ValueError):
+    """An unknown setting or a value it can't take; the message says which and why."""
+
+
+@dataclass(frozen=True)
+class Meta:
+    """What a setting is: shown name, help, range, unit, and what moving it does."""
+
+    label: str
+    help: str
+    low: float | None = None
+    high: float | None = None
+    soft_high: float | None = None
+    unit: str = ""
+    higher: str = ""
+    lower: str = ""
+    choices: tuple[tuple[str, str, str], ...] = ()
+
+    @property
+    def text(self) -> str:
+        """Help with what higher and lower do, one sentence each."""
+        parts = [self.help.rstrip(".") + "."]
+        if self.higher:
+            parts.append(f"Higher: {self.higher}.")
+        if self.lower:
+            parts.append(f"Lower: {self.lower}.")
+        return " ".join(parts)
+
+
+def _setting(default: Any, label: str, help: str, **meta: Any) -> Any:
+    return field(default=default, metadata={_META: Meta(label, help, **meta)})
+
+
+def _group(cls: type) -> Any:
+    return field(default_factory=cls)
+
+
+TECHNIQUES = (("RSM", "Reflective Shadow Maps", "One bounce gathered from virtual point lights on what the lights see"),)
+
+
+@dataclass
+class ShadowSettings:
+    """Shadow maps, which every technique's direct light reads."""
+
+    resolution: int = _setting(
+        1024, "Resolution", "Texels along one side of a light's shadow map (a point light has six)",
+        low=64, high=8192, unit="px", higher="finer shadow edges", lower="faster, blockier",
+    )  # fmt: skip
+    softness: float = _setting(
+        1.0, "Filter", "Radius of the shadow filter", low=0.0, high=8.0, unit="texels",
+        higher="smoother edges, less contact", lower="crisper, stair steps at few sub-frames",
+    )  # fmt: skip
+
+
+@dataclass
+class AOSettings:
+    """Ambient occlusion (Mittring 2007, in the paper's form)."""
+
+    samples: int = _setting(
+        4, "Directions", "Directions tested around each pixel and sub-frame", low=1, high=256,
+        higher="less noise", lower="faster",
+    )  # fmt: skip
+    steps: int = _setting(
+        6, "Steps", "Depth-buffer tests along each direction; 1 is the paper's single point per direction",
+        low=1, high=32, higher="finds thin occluders", lower="faster",
+    )  # fmt: skip
+    distance: float = _setting(
+        0.0, "Distance", "How far an occluder counts in the Ambient Occlusion pass; 0 takes the world's distance, as "
+        "Cycles does", low=0.0, high=1e6, soft_high=100.0, unit="m", higher="darker, wider", lower="only contacts",
+    )  # fmt: skip
+    contact: float = _setting(
+        0.05, "Contact", "How far an occluder dims indirect light that is not tested for visibility, as a share of the "
+        "scene's radius", low=0.0, high=1.0, higher="wider dark corners", lower="only touching surfaces",
+    )  # fmt: skip
+
+
+@dataclass
+class WorldSettings:
+    """Light from the world, taken as a few distant suns per sub-frame."""
+
+    samples: int = _setting(
+        4, "Directions", "Directions of the world's light per sub-frame, each with its own shadow map",
+        low=1, high=64, higher="smoother sky light", lower="faster",
+    )  # fmt: skip
+    resolution: int = _setting(
+        512, "Resolution", "Texels along one side of those shadow maps", low=64, high=4096, unit="px",
+        higher="finer openings", lower="faster, leaks through small walls",
+    )  # fmt: skip
+
+
+@dataclass
+class RSMSettings:
+    """Reflective shadow maps (Dachsbacher and Stamminger 2005)."""
+
+    resolution: int = _setting(
+        512, "Resolution", "Texels along one side of a light's reflective shadow map", low=16, high=4096, unit="px",
+        higher="finer bounce sources", lower="faster",
+    )  # fmt: skip
+    samples: int = _setting(
+        200, "Samples", "Virtual point lights gathered per pixel and sub-frame", low=1, high=4096,
+        higher="less blotchy near surfaces", lower="faster",
+    )  # fmt: skip
+    gather_scale: int = _setting(
+        4, "Gather Scale", "Pixels per side of one low-resolution gather; the rest is interpolated where surfaces agree",
+        low=1, high=16, unit="px", higher="faster", lower="less blur; 1 gathers at every pixel",
+    )  # fmt: skip
+
+
+@dataclass
+class Settings:
+    """All of ``scene.quartet``."""
+
+    technique: str = _setting("RSM", "Technique", "How light bounces", choices=TECHNIQUES)
+    use_indirect_diffuse: bool = _setting(True, "Indirect Diffuse", "Light that bounced off surfaces onto surfaces")
+    use_glossy: bool = _setting(True, "Glossy Reflections", "What glossy surfaces mirror")
+    use_shadows: bool = _setting(True, "Shadows", "Lights are blocked by objects")
+    use_ao: bool = _setting(True, "Ambient Occlusion", "Near surfaces block light that nothing else tests")
+    use_translucency: bool = _setting(True, "Translucency", "Light through and inside objects")
+    use_volumetric: bool = _setting(True, "Volumetric Light", "Light scattered in the air")
+    use_area_lights: bool = _setting(True, "Area Lights", "Area lights and emissive surfaces give light")
+    samples: int = _setting(
+        16, "Samples", "Jittered sub-frames averaged in a final image", low=1, high=65536, soft_high=256,
+        higher="smoother edges, shadows and lens blur", lower="faster",
+    )  # fmt: skip
+    viewport_samples: int = _setting(
+        16, "Viewport Samples", "Sub-frames averaged in the viewport while nothing changes", low=1, high=65536,
+        soft_high=256, higher="smoother after a while", lower="settles sooner",
+    )  # fmt: skip
+    bounces: int = _setting(
+        1, "Bounces", "Diffuse bounces of light; 1 is the paper's", low=0, high=1,
+        higher="brighter interiors", lower="0 is direct light only",
+    )  # fmt: skip
+    pixel_filter: str = _setting(
+        "BOX", "Pixel Filter", "How sub-frames weigh in a pixel",
+        choices=(("BOX", "Box", "Every point of the pixel alike"),
+                 ("BLACKMAN_HARRIS", "Blackman-Harris", "Cycles' default: soft, without ringing")),
+    )  # fmt: skip
+    filter_width: float = _setting(
+        1.0, "Filter Width", "Width of the pixel filter", low=0.01, high=10.0, unit="px",
+        higher="softer image", lower="sharper image",
+    )  # fmt: skip
+    shadows: ShadowSettings = _group(ShadowSettings)
+    ao: AOSettings = _group(AOSettings)
+    world: WorldSettings = _group(WorldSettings)
+    rsm: RSMSettings = _group(RSMSettings)
+
+    # -- access by dotted name ---------------------------------------------------------------------------------
+
+    def get(self, path: str) -> Any:
+        """Value at a dotted ``path`` such as ``rsm.samples``. Raises SettingError for an unknown one."""
+        owner, name = self._owner(path)
+        return getattr(owner, name)
+
+    def set(self, path: str, value: Any) -> None:
+        """Set ``path`` from a value or its text; checks type, range and choices. Raises SettingError."""
+        owner, name = self._owner(path)
+        setattr(owner, name, convert(path, value, getattr(type(owner)(), name), meta_of(type(owner), name)))
+
+    def _owner(self, path: str) -> tuple[Any, str]:
+        owner: Any = self
+        *groups, name = path.split(".")
+        for group in groups:
+            if not dataclasses.is_dataclass(getattr(owner, group, None)):
+                raise SettingError(_unknown(path))
+            owner = getattr(owner, group)
+        known = {f.name: f for f in dataclasses.fields(owner)}
+        if name not in known or _META not in known[name].metadata:
+            raise SettingError(_unknown(path))
+        return owner, name
+
+    def as_dict(self) -> dict[str, Any]:
+        """All values by dotted name."""
+        return {path: self.get(path) for path, _, _ in walk()}
+
+    def copy(self) -> Settings:
+        """An independent copy."""
+        other = Settings()
+        for path, value in self.as_dict().items():
+            other.set(path, value)
+        return other
+
+
+def meta_of(cls: type, name: str) -> Meta:
+    """The Meta of field ``name`` of a settings class."""
+    return next(f.metadata[_META] for f in dataclasses.fields(cls) if f.name == name)
+
+
+def walk(cls: type = Settings, prefix: str = "") -> Iterator[tuple[str, Any, Meta]]:
+    """(dotted name, default, Meta) of every setting, in declaration order."""
+    instance = cls()
+    for f in dataclasses.fields(cls):
+        value = getattr(instance, f.name)
+        if _META in f.metadata:
+            yield prefix + f.name, value, f.metadata[_META]
+        else:
+            yield from walk(type(value), f"{prefix}{f.name}.")
+
+
+def convert(path: str, value: Any, default: Any, meta: Meta) -> Any:
+    """``value`` (typed or text) as the type of ``default``, checked. Raises SettingError."""
+    try:
+        if isinstance(default, bool):
+            if isinstance(value, str):
+                value = {"true": True, "on": True, "1": True, "yes": True}.get(
+                    value.lower(), False if value.lower() in ("false", "off", "0", "no") else None
+                )
+            if not isinstance(value, (bool, int)) or value is None:
+                raise ValueError
+            return bool(value)
+        if isinstance(default, int):
+            number = int(value)
+            if isinstance(value, float) and number != value:
+                raise ValueError
+            value = number
+        elif isinstance(default, float):
+            value = float(value)
+            if value != value:
+                raise ValueError
+        else:
+            value = str(value).upper() if meta.choices else str(value)
+    except (TypeError, ValueError):
+        raise SettingError(f"{path}: {value!r} is not a{_kind(default)}") from None
+    if meta.choices and value not in [c[0] for c in meta.choices]:
+        raise SettingError(f"{path}: {value!r} is none of {', '.join(c[0] for c in meta.choices)}")
+    if meta.low is not None and value < meta.low or meta.high is not None and value > meta.high:
+        raise SettingError(f"{path}: {value} is outside {meta.low} … {meta.high}")
+    return value
+
+
+def _kind(default: Any) -> str:
+    if isinstance(default, bool):
+        return "n on/off value"
+    if isinstance(default, int):
+        return " whole number"
+    return " number" if isinstance(default, float) else " name"
+
+
+def _unknown(path: str) -> str:
+    import difflib
+
+    near = difflib.get_close_matches(path, [p for p, _, _ in walk()], n=1)
+    return f"there is no setting {path!r}" + (f"; did you mean {near[0]!r}?" if near else "")
+
+
+def markdown() -> str:
+    """The settings reference of the docs."""
+    rows = ["| setting | default | range | what it does |", "| --- | --- | --- | --- |"]
+    for path, default, meta in walk():
+        if meta.choices:
+            span = ", ".join(f"`{c[0]}`" for c in meta.choices)
+        elif isinstance(default, bool):
+            span = "on, off"
+        else:
+            span = f"{meta.low} … {meta.high} {meta.unit}".strip()
+        rows.append(f"| `{path}` | `{default}` | {span} | {meta.text} |")
+    return "\n".join(rows) + "\n"
