@@ -66,6 +66,7 @@ def gather_facts(
         scene.lights, bounds,
         world=world, world_samples=s.world.samples,
         emitters=emitters, emitter_samples=_EMITTER_SAMPLES, area_lights=s.use_area_lights,
+        shadows=s.use_shadows, bounces=s.use_indirect_diffuse and s.bounces > 0,
         shadow_resolution=s.shadows.resolution, bounce_resolution=s.rsm.resolution,
         world_resolution=s.world.resolution,
     )  # fmt: skip

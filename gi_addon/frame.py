@@ -109,7 +109,7 @@ class Frame:
         self.subframe = 0
         self._view_buffer = view_buffer
         self._screen_vao = screen_vao
-        self._samples: dict[tuple, Sample] = {}
+        self._samples: dict[bool, Sample] = {}
         self.view = np.zeros((), VIEW)
         self.film_transparent = False
 
@@ -126,14 +126,10 @@ class Frame:
         self._view_buffer.bind_to_uniform_block(0)
 
     def light_sample(self, *, bounce: bool) -> Sample:
-        """The lights of this sub-frame, for direct light or for bounce maps."""
-        key = (bounce,)
-        if key not in self._samples:
-            rig = self.facts.rig
-            self._samples[key] = rig.sample(
-                self.subframe, self.facts.subframes, rig.bounce if bounce else rig.shadow, bounce=bounce
-            )
-        return self._samples[key]
+        """The lights of this sub-frame with their views into the shadow or the bounce maps."""
+        if bounce not in self._samples:
+            self._samples[bounce] = self.facts.rig.sample(self.subframe, self.facts.subframes, bounce=bounce)
+        return self._samples[bounce]
 
     # -- programs and bindings -----------------------------------------------------------------------------------
 

@@ -28,7 +28,7 @@ _INSTANCE_NAMES = tuple(f"instance_{name}" for name in _INSTANCE.names)
 
 _PARAMS_BINDING = 7
 _MAX_ATTRIBUTES = 4
-_ANISOTROPY = 8.0
+_ANISOTROPY = 1.0
 
 
 @dataclass
@@ -230,6 +230,7 @@ class GPUScene:
             if material >= 0:
                 self._bind_material(program, self.compiled[material], self._bases[material], options["units"])
             vao.render_indirect(buffer, moderngl.TRIANGLES, batch.count, batch.first)
+        self.unbind_images(options["units"], max((len(c.images) for c in self.compiled), default=0))
 
     def programs(self, planned: Planned, stages, visibility: int, **options) -> list:
         """The programs that :meth:`draw` will use, so that their uniforms can be set once."""
@@ -354,8 +355,8 @@ class GPUScene:
 
     def unbind_images(self, units: int, count: int) -> None:
         """Take sampler objects off the units again: they would override later textures' own modes."""
-        for slot in range(count):
-            self.gl.ctx.clear_samplers(units + slot, units + slot + 1)
+        if count:
+            self.gl.ctx.clear_samplers(units, units + count)
 
     def bind_world_params(self) -> None:
         """Bind the world's parameters in place of the materials'."""

@@ -33,22 +33,24 @@ LIGHT = struct(
     ("v_ws", "f4", 3), ("spot_scale", "f4"),      # spot: 1 / ((1 − cos) blend)
     ("center_ws", "f4", 3), ("spread_tan", "f4"),  # of the whole light; tan of half the spread (area)
     ("patch_radius", "f4"), ("spread_scale", "f4"), ("shape", "i4"), ("flags", "i4"),
+    ("soft_radius2", "f4"), ("_pad0", "u4"), ("_pad1", "u4"), ("_pad2", "u4"),  # m², of a point's or spot's soft disc
 )  # fmt: skip
 LIGHT_SUN, LIGHT_POINT, LIGHT_SPOT, LIGHT_AREA, LIGHT_WORLD, LIGHT_MESH = range(6)
 LIGHT_FLAG_SHADOW, LIGHT_FLAG_BOUNCE, LIGHT_FLAG_CAMERA = 1, 2, 4
 SHAPE_RECTANGLE, SHAPE_ELLIPSE = 0, 1
+MAP_SHADOW, MAP_BOUNCE = 0, 1
 
 # One map's worth of a light's surroundings. A point p has depth dot(p − origin, axis_z) and map coordinates
 # (dot(p − origin, axis_x)/|axis_x|², dot(p − origin, axis_y)/|axis_y|²), divided by the depth where `perspective`;
 # the light's own span is [−1, 1]². `rect` is (x, y, width, height) of the tile in texels of the atlas; the tile shows
-# `guard` times the span, so that filters don't leave it.
+# `guard` times the span, so that filters don't leave it. `map` says which atlas: MAP_SHADOW or MAP_BOUNCE.
 LIGHT_VIEW = struct(
     ("origin_ws", "f4", 3), ("perspective", "f4"),
     ("axis_x", "f4", 3), ("near", "f4"),
     ("axis_y", "f4", 3), ("far", "f4"),
     ("axis_z", "f4", 3), ("guard", "f4"),
     ("rect", "f4", 4),
-    ("light", "i4"), ("_pad0", "u4"), ("_pad1", "u4"), ("_pad2", "u4"),
+    ("light", "i4"), ("map", "i4"), ("_pad0", "u4"), ("_pad1", "u4"),
 )  # fmt: skip
 
 # A virtual point light: `flux` (W) reflected by a disc of `area` (m²) at `position_ws` facing `normal_ws`.
@@ -60,7 +62,7 @@ VPL = struct(
 
 
 def _constants() -> str:
-    names = {k: v for k, v in globals().items() if isinstance(v, int) and k.startswith(("LIGHT_", "SHAPE_"))}
+    names = {k: v for k, v in globals().items() if isinstance(v, int) and k.startswith(("LIGHT_", "SHAPE_", "MAP_"))}
     return "\n".join(f"const int {name} = {value};" for name, value in names.items())
 
 

@@ -115,8 +115,8 @@ class Uniform:
 class Pass:
     """One box of a technique's pipeline.
 
-    ``rate`` is ``static`` (kept until a stamp in ``depends``, a setting in ``settings`` or an input changes) or
-    ``subframe``. ``shaders`` maps a key to stages (see ``GL.program``). ``figure`` names the paper's box.
+    ``rate`` is ``static`` (run only when stale: a stamp in ``depends``, a setting in ``settings`` or a static input has
+    changed) or ``subframe`` (every time; ``Planned.stale`` then tells what of it is still good). ``shaders`` maps a key to stages (see ``GL.program``). ``figure`` names the paper's box.
     """
 
     title: ClassVar[str] = ""
@@ -157,8 +157,8 @@ class Planned:
     absent_writes: list[Texture | Buffer]
     reason: str
     programs: dict[Any, Any] = field(default_factory=dict)
-    key: Any = None
-    runs: int = 0
+    # Whether what the pass depends on has changed since it last ran: all of its output is due.
+    stale: bool = True
 
     @property
     def title(self) -> str:

@@ -24,6 +24,8 @@ from .gpu_types import (
     LIGHT_SUN,
     LIGHT_VIEW,
     LIGHT_WORLD,
+    MAP_BOUNCE,
+    MAP_SHADOW,
     SHAPE_ELLIPSE,
     SHAPE_RECTANGLE,
 )
@@ -116,28 +118,30 @@ class LightRig:
     bounce: Maps
     notes: list[str] = field(default_factory=list)
 
-    @property
-    def soft(self) -> bool:
-        """Whether shadow maps differ between sub-frames."""
-        return any(s.soft and s.views for s in self.sources)
+    def moves(self, index: int, *, bounce: bool) -> bool:
+        """Whether source ``index`` is another point in each sub-frame. Suns, spheres and discs bounce from their
+        centre: where their light lands hardly depends on the point."""
+        source = self.sources[index]
+        return source.soft and not (bounce and source.kind in (LIGHT_SUN, LIGHT_POINT, LIGHT_SPOT))
 
-    @property
-    def bounce_soft(self) -> bool:
-        """Whether bounce maps differ between sub-frames. Discs and spheres bounce from their centre."""
-        return any(s.soft and s.views and s.kind in (LIGHT_AREA, LIGHT_MESH, LIGHT_WORLD) for s in self.sources)
+    def any_moves(self, maps: Maps, *, bounce: bool) -> bool:
+        """Whether any view in ``maps`` differs between sub-frames."""
+        return any(maps.first[i] >= 0 and self.moves(i, bounce=bounce) for i in range(len(self.sources)))
 
-    def sample(self, subframe: int, subframes: int, maps: Maps, *, bounce: bool) -> Sample:
-        """Every source's point at ``subframe`` of ``subframes``, with views into ``maps``."""
+    def sample(self, subframe: int, subframes: int, *, bounce: bool) -> Sample:
+        """Every source's point at ``subframe`` of ``subframes``, with its views into the bounce or shadow maps."""
+        maps = self.bounce if bounce else self.shadow
         lights = np.zeros(len(self.sources), LIGHT)
         views: list[np.ndarray] = []
         clips: list[np.ndarray] = []
         for i, source in enumerate(self.sources):
-            centred = subframes == 1 or (bounce and source.kind in (LIGHT_SUN, LIGHT_POINT, LIGHT_SPOT))
             if source.kind in (LIGHT_WORLD, LIGHT_MESH):
                 u = sobol_2d(subframe * source.count + source.index, source.seed)
+            elif subframes == 1 or not self.moves(i, bounce=bounce):
+                u = np.array([0.5, 0.5])
             else:
-                u = np.array([0.5, 0.5]) if centred else sobol_2d(subframe, source.seed)
-            self._place(lights[i], source, u, 1 if bounce else subframes)
+                u = sobol_2d(subframe, source.seed)
+            self._place(lights[i], source, u, subframes)
             lights[i]["first_view"] = maps.first[i]
             if maps.first[i] < 0:
                 lights[i]["views"] = 0
@@ -145,16 +149,39 @@ class LightRig:
             for face, (rows, perspective) in enumerate(self._faces(lights[i], source)):
                 tile = maps.first[i] + face
                 view = np.zeros((), LIGHT_VIEW)
-                guard = 1.0 if bounce else 1.0 + 2.0 * _GUARD_TEXELS / maps.sizes[tile]
+                guard = 1.0 + 2.0 * _GUARD_TEXELS / maps.sizes[tile]
                 clips.append(self._fill_view(view, lights[i], rows, perspective, guard))
                 view["rect"] = (*maps.corners[tile], maps.sizes[tile], maps.sizes[tile])
                 view["light"] = i
+                view["map"] = MAP_BOUNCE if bounce else MAP_SHADOW
                 views.append(view)
         return Sample(
             lights,
             np.array(views, LIGHT_VIEW) if views else np.zeros(0, LIGHT_VIEW),
             np.array(clips, "f4").reshape(-1, 4, 4),
         )
+
+    def direct_sample(self, subframe: int, subframes: int) -> tuple[np.ndarray, np.ndarray]:
+        """(lights, views) for direct light: shadow maps, and bounce maps for sources that have no shadow map of their
+        own because the bounce map is one."""
+        shadow = self.sample(subframe, subframes, bounce=False)
+        lights = shadow.lights.copy()
+        shared = [i for i in range(len(self.sources)) if self.shares(i)]
+        if not shared:
+            return lights, shadow.views
+        bounce = self.sample(subframe, subframes, bounce=True)
+        for i in shared:
+            lights[i]["first_view"] = len(shadow.views) + self.bounce.first[i]
+            lights[i]["views"] = self.sources[i].views
+        return lights, np.concatenate([shadow.views, bounce.views])
+
+    def shares(self, index: int) -> bool:
+        """Whether the source's bounce map serves as its shadow map."""
+        return self.shadow.first[index] < 0 <= self.bounce.first[index] and self.casts_shadow(index)
+
+    def casts_shadow(self, index: int) -> bool:
+        light = self.sources[index].light
+        return light is None or light.use_shadow
 
     # -- sources -------------------------------------------------------------------------------------------------
 
@@ -185,16 +212,18 @@ class LightRig:
         share = 1.0 / np.sqrt(subframes)
         if source.kind == LIGHT_SUN:
             half = 0.5 * light.angle
-            # Uniform over the solid angle of the disc: z uniform in [cos half, 1].
-            cos = 1.0 - (1.0 - np.cos(half)) * float(disc @ disc)
-            radius = np.linalg.norm(disc)
-            planar = disc / radius * np.sqrt(max(0.0, 1.0 - cos * cos)) if radius > 0 else disc
+            # Uniform over the disc's projection, where a direction at angle α from the axis stands for dω = dA/cosα:
+            # all of them together then light a facing surface by the sun's strength exactly.
+            planar = disc * np.sin(half)
+            cos = float(np.sqrt(max(0.0, 1.0 - planar @ planar)))
             out["axis_ws"] = -_unit(planar[0] * x + planar[1] * y + cos * z)
+            out["emission"] = light.emission / max(cos, 1e-3)
             out["patch_radius"] = half * share
             return
         if source.kind in (LIGHT_POINT, LIGHT_SPOT):
             out["emission"] = light.emission / (4.0 * np.pi)
             out["patch_radius"] = light.radius * share
+            out["soft_radius2"] = light.radius**2 if light.soft_falloff else 0.0
             if light.radius > 0.0 and (disc != 0).any():
                 # Cycles shows soft lights as a disc facing the shaded point. One point serves all points here, so it
                 # is drawn from the ball whose projection onto any plane has the disc's spread about its centre: the
@@ -327,6 +356,8 @@ def build_rig(
     emitters: Emitters,
     emitter_samples: int,
     area_lights: bool,
+    shadows: bool,
+    bounces: bool,
     shadow_resolution: int,
     bounce_resolution: int,
     world_resolution: int,
@@ -373,11 +404,15 @@ def build_rig(
         corners, size = atlas.pack(sizes, power_of_two=True)
         return Maps(sizes, corners, size, first)
 
+    def own_shadow_map(source: Source) -> bool:
+        if not shadows or (source.light is not None and not source.light.use_shadow):
+            return False
+        # What is drawn anew in each sub-frame anyway, at the very point that direct light comes from, is drawn once.
+        return not (bounces and source.kind in (LIGHT_AREA, LIGHT_MESH, LIGHT_WORLD))
+
     return LightRig(
         sources, bounds, world, emitters,
-        tiles(shadow_resolution, lambda s: s.light is None or s.light.use_shadow),
-        tiles(bounce_resolution, lambda s: True),
-        notes,
+        tiles(shadow_resolution, own_shadow_map), tiles(bounce_resolution, lambda s: bounces), notes,
     )  # fmt: skip
 
 

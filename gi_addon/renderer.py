@@ -157,21 +157,22 @@ class Renderer:
         for planned in self._plan.run:
             task, facts = planned.task, frame.facts
             planned.facts = facts
-            if task.rate(facts) == "static":
-                key = (
-                    tuple(facts.stamps[kind] for kind in task.depends),
-                    tuple(frame.settings.get(path) for path in task.settings),
-                    tuple(w.name for w in planned.writes),
-                    facts.rig.shadow.size, facts.rig.bounce.size,
-                )  # fmt: skip
-                last = self._static.get(task.title)
-                if last and last[0] == key and not rerun & {r.name for r in planned.reads}:
-                    continue
-                self._static[task.title] = (key, tuple(w.name for w in planned.writes))
+            key = (
+                tuple(facts.stamps[kind] for kind in task.depends),
+                tuple(frame.settings.get(path) for path in task.settings),
+                tuple(w.name for w in planned.writes),
+                facts.rig.shadow.size, facts.rig.bounce.size,
+            )  # fmt: skip
+            last = self._static.get(task.title)
+            planned.stale = last is None or last[0] != key or bool(rerun & {r.name for r in planned.reads})
+            static = task.rate(facts) == "static"
+            if static and not planned.stale:
+                continue
+            self._static[task.title] = (key, tuple(w.name for w in planned.writes))
+            if static:
                 rerun |= {w.name for w in planned.writes}
             with self.timers.measure(task.title):
                 task.run(frame, planned)
-            planned.runs += 1
             if _CHECK_EACH_PASS:
                 self.gl.check(task.title)
 

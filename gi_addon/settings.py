@@ -96,11 +96,11 @@ class WorldSettings:
     """Light from the world, taken as a few distant suns per sub-frame."""
 
     samples: int = _setting(
-        4, "Directions", "Directions of the world's light per sub-frame, each with its own shadow map",
+        2, "Directions", "Directions of the world's light per sub-frame, each with its own shadow map",
         low=1, high=64, higher="smoother sky light", lower="faster",
     )  # fmt: skip
     resolution: int = _setting(
-        512, "Resolution", "Texels along one side of those shadow maps", low=64, high=4096, unit="px",
+        256, "Resolution", "Texels along one side of those shadow maps", low=64, high=4096, unit="px",
         higher="finer openings", lower="faster, leaks through small walls",
     )  # fmt: skip
 

@@ -65,20 +65,24 @@ class RSMFlux(Pass):
     depends = ("lights", "world", "transforms", "meshes", "materials")
 
     def rate(self, facts: Facts) -> str:
-        return "subframe" if facts.rig.bounce_soft and facts.subframes > 1 else "static"
+        return RSMGeneration().rate(facts)
 
     def absent(self, facts: Facts) -> str | None:
         return _bounce_off(facts)
 
     def run(self, frame: Frame, planned: Planned) -> None:
-        maps = planned.facts.rig.bounce
+        facts = planned.facts
+        maps = facts.rig.bounce
         flux = frame.resources["rsm.flux"]
         program = frame.program(planned)
-        if planned.runs == 0:
-            self._clear(frame, planned)
+        if planned.stale:
+            # Texels outside every tile hold nothing.
+            frame.pool.framebuffer([flux]).clear(0.0, 0.0, 0.0, 0.0)
+        views = frame.light_sample(bounce=True).views
         for tile, size in enumerate(maps.sizes):
-            frame.set(program, tile=tile)
-            frame.compute(planned, program, (size, size))
+            if planned.stale or facts.rig.moves(int(views[tile]["light"]), bounce=True):
+                frame.set(program, tile=tile)
+                frame.compute(planned, program, (size, size))
         reduce = frame.program(planned, "reduce")
         width, height = maps.size
         level = 0
@@ -89,12 +93,6 @@ class RSMFlux(Pass):
             reduce.run(-(-width // 8), -(-height // 8))
             frame.gl.ctx.memory_barrier()
             level += 1
-
-    @staticmethod
-    def _clear(frame: Frame, planned: Planned) -> None:
-        """Texels outside every tile hold nothing."""
-        fbo = frame.pool.framebuffer([frame.resources["rsm.flux"]])
-        fbo.clear(0.0, 0.0, 0.0, 0.0)
 
 
 class RSMSamplingPattern(Pass):

@@ -137,7 +137,8 @@ class Compiler:
         return f"material_image_{len(used)}"
 
     def attribute(self, name: str) -> str:
-        """The GLSL name (vec4) of mesh attribute ``name``."""
+        """The GLSL name (vec4) of mesh attribute ``name``: ``uv:LAYER``, ``color:LAYER`` (no layer: the active one) or
+        ``attr:NAME``."""
         if name not in self.result.attributes:
             self.result.attributes.append(name)
         return f"attribute_value_{self.result.attributes.index(name)}"

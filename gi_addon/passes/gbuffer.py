@@ -27,7 +27,7 @@ def gather_size(facts: Facts) -> tuple[int, int]:
 class GBuffer(Pass):
     title = "G-buffers Generation"
     figure = "G-buffers Generation"
-    reads = (Optional("brdf.albedo"),)
+    reads = (Optional("brdf.albedo"), Optional("brdf.average"), Optional("brdf.energy"))
     writes = (
         Texture("gbuffer.depth", "gbuf_depth", "view depth, world units; 0 where nothing is", "r32f", _screen,
                 scratch=True),

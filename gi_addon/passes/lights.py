@@ -10,7 +10,6 @@ from ..facts import Facts
 from ..frame import Frame
 from ..gpu_types import LIGHT, LIGHT_VIEW
 from ..graph import Buffer, Optional, Pass, Planned, Texture, Uniform
-from ..lights import Sample
 from ..scene import DIFFUSE, SHADOW
 
 _VERTEX = "surface/surface_vert.glsl"
@@ -33,20 +32,18 @@ class LightList(Pass):
         Buffer("lights", "lights", "the lights' points of this sub-frame", "Light", LIGHT,
                lambda f: max(1, len(f.rig.sources))),
         Buffer("lights.views", "light_views", "what their shadow maps show", "LightView", LIGHT_VIEW,
-               lambda f: max(1, len(f.rig.shadow.sizes))),
+               lambda f: max(1, len(f.rig.shadow.sizes) + len(f.rig.bounce.sizes))),
     )  # fmt: skip
-    depends = ("lights", "world", "transforms", "meshes")
 
     def absent(self, facts: Facts) -> str | None:
         return _no_light(facts)
 
     def run(self, frame: Frame, planned: Planned) -> None:
-        sample = frame.light_sample(bounce=False)
-        lights = sample.lights.copy()
+        lights, views = planned.facts.rig.direct_sample(frame.subframe, planned.facts.subframes)
         if not planned.facts.settings.use_shadows:
             lights["views"] = 0
         frame.upload("lights", lights)
-        frame.upload("lights.views", sample.views)
+        frame.upload("lights.views", views)
 
 
 class ShadowMaps(Pass):
@@ -63,17 +60,17 @@ class ShadowMaps(Pass):
     settings = ("shadows.resolution", "world.resolution", "world.samples")
 
     def rate(self, facts: Facts) -> str:
-        return "subframe" if facts.rig.soft and facts.subframes > 1 else "static"
+        return "subframe" if facts.subframes > 1 and facts.rig.any_moves(facts.rig.shadow, bounce=False) else "static"
 
     def absent(self, facts: Facts) -> str | None:
         if not facts.settings.use_shadows:
             return "shadows are switched off"
         if not facts.rig.shadow.sizes:
-            return _no_light(facts) or "no light casts shadows"
+            return _no_light(facts) or "no light casts shadows, or the RSMs serve for them"
         return None if facts.triangles else "the scene has no surfaces"
 
     def run(self, frame: Frame, planned: Planned) -> None:
-        draw_light_maps(frame, planned, frame.light_sample(bounce=False), SHADOW,
+        draw_light_maps(frame, planned, SHADOW,
                         "passes/shadow_map_frag.glsl", full=False)
 
 
@@ -82,7 +79,7 @@ class RSMGeneration(Pass):
 
     title = "RSM Generation"
     figure = "RSM Generation"
-    reads = (Optional("brdf.albedo"), Optional("brdf.average"))
+    reads = (Optional("brdf.albedo"), Optional("brdf.average"), Optional("brdf.energy"))
     writes = (
         Texture("rsm.depth", "rsm_depth", "depth along each map's axis, world units", "r32f",
                 lambda f: f.rig.bounce.size),
@@ -101,7 +98,7 @@ class RSMGeneration(Pass):
     settings = ("rsm.resolution", "world.resolution", "world.samples")
 
     def rate(self, facts: Facts) -> str:
-        return "subframe" if facts.rig.bounce_soft and facts.subframes > 1 else "static"
+        return "subframe" if facts.subframes > 1 and facts.rig.any_moves(facts.rig.bounce, bounce=True) else "static"
 
     def absent(self, facts: Facts) -> str | None:
         if not facts.rig.bounce.sizes:
@@ -112,36 +109,45 @@ class RSMGeneration(Pass):
         sample = frame.light_sample(bounce=True)
         frame.upload("rsm.lights", sample.lights)
         frame.upload("rsm.views", sample.views)
-        draw_light_maps(frame, planned, sample, DIFFUSE, "passes/rsm_frag.glsl", full=True)
+        draw_light_maps(frame, planned, DIFFUSE, "passes/rsm_frag.glsl", full=True)
 
 
-def draw_light_maps(
-    frame: Frame, planned: Planned, sample: Sample, visibility: int, fragment: str, *, full: bool
-) -> None:
-    """Draw every view of ``sample`` into its tile of the pass's targets; ``full`` evaluates every material, else only
-    those that let light through."""
+def draw_light_maps(frame: Frame, planned: Planned, visibility: int, fragment: str, *, full: bool) -> None:
+    """Draw the views that are due into their tiles of the pass's targets: all of them when the pass is stale, else those
+    of lights that move between sub-frames. ``full`` evaluates every material (bounce maps), else only those that let
+    light through (shadow maps)."""
+    rig = planned.facts.rig
+    sample = frame.light_sample(bounce=full)
+    moving = planned.facts.subframes > 1
+    due = [
+        i for i, view in enumerate(sample.views) if planned.stale or (moving and rig.moves(int(view["light"]), bounce=full))
+    ]  # fmt: skip
     ctx = frame.gl.ctx
     fbo = frame.targets(planned)
     fbo.use()
-    fbo.scissor = None
-    fbo.viewport = (0, 0, *fbo.size)
     # Where a map shows nothing, a shadow map is far beyond every surface, and a bounce map has albedo (and alpha) 0.
     nothing = 0.0 if full else 1e30
-    fbo.clear(nothing, nothing, nothing, nothing, depth=1.0)
+    if planned.stale:
+        fbo.scissor = None
+        fbo.viewport = (0, 0, *fbo.size)
+        fbo.clear(nothing, nothing, nothing, nothing, depth=1.0)
     ctx.enable_only(moderngl.DEPTH_TEST)
     frame.bind(planned)
     frame.gpu.bind_params()
-    units = len(planned.texture_reads())
     options = dict(
-        full=full, units=units, defines={
-            "SURFACE_TABLES": 2 if planned.has("brdf.average") else 0, "SURFACE_SEE_THROUGH_GLASS": 1, "SURFACE_SEEN_BY_CAMERA": 0,
-            "SURFACE_SEEN_BY_SHADOW": int(not full),
+        full=full, units=len(planned.texture_reads()), defines={
+            "SURFACE_TABLES": 2 if planned.has("brdf.average") else 0, "SURFACE_SEE_THROUGH_GLASS": 1,
+            "SURFACE_SEEN_BY_CAMERA": 0, "SURFACE_SEEN_BY_SHADOW": int(not full),
         },
     )  # fmt: skip
     stages = {"vertex": _VERTEX, "fragment": fragment}
     programs = frame.gpu.programs(planned, stages, visibility, **options)
-    for view, clip in zip(sample.views, sample.clip_from_world, strict=True):
-        fbo.viewport = tuple(int(v) for v in view["rect"])
+    for i in due:
+        view = sample.views[i]
+        rect = tuple(int(v) for v in view["rect"])
+        if not planned.stale:
+            fbo.clear(nothing, nothing, nothing, nothing, depth=1.0, viewport=rect)
+        fbo.viewport = rect
         for program in programs:
             frame.set(
                 program,
@@ -149,4 +155,5 @@ def draw_light_maps(
                 light_axis_ws=tuple(view["axis_z"]),
                 light_perspective=float(view["perspective"]),
             )
-        frame.gpu.draw(planned, stages, visibility, np.ascontiguousarray(clip.T, "f4"), **options)
+        clip = np.ascontiguousarray(sample.clip_from_world[i].T, "f4")
+        frame.gpu.draw(planned, stages, visibility, clip, **options)

@@ -146,23 +146,51 @@ float albedo_curve_average(sampler2D average_table, float roughness, float eta)
     return textureLod(average_table, vec2(table_uv(vec2(roughness, 0.0), size).x, (slice + 0.5) / size.y), 0.0).r;
 }
 
-// Directional albedo of the lobe: Cycles' Glossy Color.
-vec3 lobe_albedo(sampler3D albedo_table, Lobe lobe, float cos_v)
+// Energy of the lobe without Fresnel: E for this direction, and its average over all.
+vec2 lobe_energy(sampler2D energy_table, float roughness, float cos_v)
 {
-    return mix(lobe.f0, vec3(lobe.f90), albedo_curve(albedo_table, lobe.roughness, cos_v, lobe.eta));
+    vec2 size = vec2(textureSize(energy_table, 0));
+    return textureLod(energy_table, table_uv(vec2(roughness, cos_v), size), 0.0).rg;
 }
 
-// Gain that returns what a single bounce between microfacets loses: 1 + Fms (1 − E) / E with
-// Fms = Fss Eavg / (1 − Fss (1 − Eavg)) (Kulla and Conty, appendix). The energy table holds (E, Eavg).
+// What bounces between microfacets bring back, relative to E: Fms = Fss Eavg / (1 − Fss (1 − Eavg)) (Kulla and Conty,
+// appendix). Fss, the Fresnel curve's own average, is a smooth lobe's albedo average.
+vec3 multiscatter_fresnel(sampler2D average_table, Lobe lobe, float e_average)
+{
+    vec3 fss = mix(lobe.f0, vec3(lobe.f90), albedo_curve_average(average_table, 0.0, lobe.eta));
+    return fss * e_average / max(vec3(1.0) - fss * (1.0 - e_average), vec3(1e-4));
+}
+
+// Gain of the single-bounce BRDF for them: 1 + Fms (1 − E)/E.
 vec3 multiscatter_gain(sampler2D energy_table, sampler2D average_table, Lobe lobe, float cos_v)
 {
     if (lobe.multiscatter <= 0.0) {
         return vec3(1.0);
     }
-    vec2 size = vec2(textureSize(energy_table, 0));
-    vec2 e = textureLod(energy_table, table_uv(vec2(lobe.roughness, cos_v), size), 0.0).rg;
-    // A smooth lobe's average curve is the Fresnel curve's own average.
-    vec3 fss = mix(lobe.f0, vec3(lobe.f90), albedo_curve_average(average_table, 0.0, lobe.eta));
-    vec3 fms = fss * e.y / max(vec3(1.0) - fss * (1.0 - e.y), vec3(1e-4));
+    vec2 e = lobe_energy(energy_table, lobe.roughness, cos_v);
+    vec3 fms = multiscatter_fresnel(average_table, lobe, e.y);
     return mix(vec3(1.0), vec3(1.0) + fms * ((1.0 - e.x) / max(e.x, 1e-4)), lobe.multiscatter);
+}
+
+// Share of the Fresnel albedo that is left of a lobe of energy `e`: E + Fms (1 − E). Without multiple scattering Cycles
+// takes the albedo as if nothing were lost.
+vec3 multiscatter_share(sampler2D average_table, Lobe lobe, vec2 e)
+{
+    vec3 fms = multiscatter_fresnel(average_table, lobe, e.y);
+    return mix(vec3(1.0), vec3(e.x) + fms * (1.0 - e.x), lobe.multiscatter);
+}
+
+// Directional albedo of the lobe: Cycles' Glossy Color.
+vec3 lobe_albedo(sampler3D albedo_table, sampler2D average_table, sampler2D energy_table, Lobe lobe, float cos_v)
+{
+    vec3 f = mix(lobe.f0, vec3(lobe.f90), albedo_curve(albedo_table, lobe.roughness, cos_v, lobe.eta));
+    return f * multiscatter_share(average_table, lobe, lobe_energy(energy_table, lobe.roughness, cos_v));
+}
+
+// The same averaged over the hemisphere of views.
+vec3 lobe_albedo_average(sampler2D average_table, sampler2D energy_table, Lobe lobe)
+{
+    vec3 f = mix(lobe.f0, vec3(lobe.f90), albedo_curve_average(average_table, lobe.roughness, lobe.eta));
+    float e = lobe_energy(energy_table, lobe.roughness, 1.0).y;
+    return f * multiscatter_share(average_table, lobe, vec2(e));
 }

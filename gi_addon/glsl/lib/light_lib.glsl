@@ -52,7 +52,13 @@ vec3 light_arriving(Light light, vec3 position_ws, out vec3 l, out float angle)
     l = to_light * inversesqrt(distance2);
     float facing = light.kind == LIGHT_AREA || light.kind == LIGHT_MESH ? abs(dot(l, light.axis_ws)) : 1.0;
     angle = light.patch_radius * sqrt(facing / distance2);
-    return light_intensity(light, -l) / distance2;
+    if (light.kind == LIGHT_POINT || light.kind == LIGHT_SPOT) {
+        // Blender's soft lights are discs of radius r that face the shaded point: I/(d² + r²), d to the centre. A sphere
+        // ("soft falloff" off) is I/d².
+        vec3 to_center = light.center_ws - position_ws;
+        distance2 = dot(to_center, to_center) + light.soft_radius2;
+    }
+    return light_intensity(light, -l) / max(distance2, 1e-37);
 }
 
 // --- views -----------------------------------------------------------------------------------------------------------

@@ -33,10 +33,8 @@ vec2 sobol_2d(uint index, uint seed)
     uint x = bitfieldReverse(index);
     uint y = 0u;
     uint v = 1u << 31;
-    for (uint i = index; i != 0u; i >>= 1) {
-        if ((i & 1u) != 0u) {
-            y ^= v;
-        }
+    for (int bit = 0; bit < 32; ++bit) {
+        y ^= (index >> bit & 1u) * v;
         v ^= v >> 1;
     }
     return vec2(unit_float(owen_scramble(x, hash_u32(seed0 ^ 0x9E3779B9u))),

@@ -10,6 +10,8 @@
 
 // In texels' widths: facets that meet at 10° rise by tan(10°) ≈ 0.18 over one texel.
 const float DEPTH_BIAS = 0.2;
+// How far behind its plane a surface still is the receiver: convex bends fall away by up to a texel or two per texel.
+const float DEPTH_SLACK = 4.0;
 // A plane nearly along the light has no depth of its own; its slope is held to this many texels' widths per texel.
 const float STEEPEST = 30.0;
 
@@ -19,6 +21,7 @@ struct ReceiverPlane {
     float value;      // at the texel coordinate asked for
     vec2 gradient;    // per texel
     float bias;       // how much nearer (in the same measure) still is the receiver itself
+    float slack;      // how much farther
     bool inverse;
 };
 
@@ -37,6 +40,7 @@ ReceiverPlane receiver_plane(LightView v, vec3 position_ws, vec3 ng, float depth
         r.value = 1.0 / depth;
         r.gradient = along / c;
         r.bias = DEPTH_BIAS * width / (depth * depth);
+        r.slack = DEPTH_SLACK * width / (depth * depth);
         limit /= depth * depth;
     } else {
         float c = dot(ng, v.axis_z);
@@ -44,46 +48,56 @@ ReceiverPlane receiver_plane(LightView v, vec3 position_ws, vec3 ng, float depth
         r.value = depth;
         r.gradient = -along / c;
         r.bias = DEPTH_BIAS * width;
+        r.slack = DEPTH_SLACK * width;
     }
     float steep = max(abs(r.gradient.x), abs(r.gradient.y));
     r.gradient *= min(1.0, limit / max(steep, 1e-30));
     return r;
 }
 
-// Four texels around `texel` (in texels of the atlas), each lit or not, then interpolated. `offset` is where the first
-// of them lies from the receiver's own coordinate, in texels.
-float shadow_compare(sampler2D map, ReceiverPlane plane, vec2 texel, vec2 receiver)
+// What four texels around `texel` (in texels of the atlas) say of the receiver: (lit, telling), bilinear weights.
+//
+// A texel nearer to the light than the receiver's plane blocks it. A texel on the plane shows the receiver lit. A texel
+// far behind the plane shows that the receiver is not there at all: the map looks past its edge, and such a texel tells
+// nothing. Counting it as lit is what lets light leak around the inner corners of walls without thickness.
+vec2 shadow_compare(sampler2D map, ReceiverPlane plane, vec2 texel, vec2 receiver)
 {
     vec2 base = floor(texel - 0.5);
     vec2 f = texel - 0.5 - base;
     // textureGather's order: (0,1), (1,1), (1,0), (0,0).
     vec4 d = textureGather(map, (base + 1.0) / vec2(textureSize(map, 0)));
+    d = mix(d, vec4(1e30), equal(d, vec4(0.0))); // empty texels of bounce maps
     vec2 offset = base + 0.5 - receiver;
     float origin = plane.value + dot(plane.gradient, offset);
     vec4 at = origin + vec4(plane.gradient.y, plane.gradient.x + plane.gradient.y, plane.gradient.x, 0.0);
-    vec4 lit = plane.inverse ? vec4(lessThanEqual(vec4(1.0), (at + plane.bias) * d))
-                             : vec4(greaterThanEqual(d, at - plane.bias));
-    return mix(mix(lit.w, lit.z, f.x), mix(lit.x, lit.y, f.x), f.y);
+    vec4 lit, behind;
+    if (plane.inverse) {
+        lit = vec4(lessThanEqual(vec4(1.0), (at + plane.bias) * d));
+        behind = vec4(lessThan(vec4(1.0), (at - plane.slack) * d));
+    } else {
+        lit = vec4(greaterThanEqual(d, at - plane.bias));
+        behind = vec4(greaterThan(d, at + plane.slack));
+    }
+    vec4 weight = vec4((1.0 - f.x) * f.y, f.x * f.y, f.x * (1.0 - f.y), (1.0 - f.x) * (1.0 - f.y)) * (1.0 - behind);
+    return vec2(dot(weight, lit), dot(weight, vec4(1.0)));
 }
 
 // 3 × 3 bilinear comparisons cover a filter of radius `softness` texels without gaps up to 1.5; wider ones lean on the
 // sub-frames' rotation.
 float shadow_filtered(sampler2D map, LightView v, ReceiverPlane plane, vec2 texel, float softness, float angle)
 {
-    if (softness <= 0.0) {
-        return shadow_compare(map, plane, texel, texel);
-    }
     vec2 low = v.rect.xy + 0.5;
     vec2 high = v.rect.xy + v.rect.zw - 0.5;
     mat2 turn = mat2(cos(angle), sin(angle), -sin(angle), cos(angle));
-    float sum = 0.0;
-    for (int y = -1; y <= 1; ++y) {
-        for (int x = -1; x <= 1; ++x) {
+    vec2 sum = vec2(0.0);
+    int reach = softness > 0.0 ? 1 : 0;
+    for (int y = -reach; y <= reach; ++y) {
+        for (int x = -reach; x <= reach; ++x) {
             vec2 tap = clamp(texel + turn * (vec2(x, y) * (softness * (2.0 / 3.0))), low, high); // 9 taps span 2 r
             sum += shadow_compare(map, plane, tap, texel);
         }
     }
-    return sum / 9.0;
+    return sum.y > 1e-4 ? sum.x / sum.y : 1.0;
 }
 
 // Which of a light's views sees a point: the face with the largest depth.
@@ -105,13 +119,10 @@ int light_view_of(Light light, vec3 position_ws)
     return best;
 }
 
-// Share of a light that reaches a point of a surface with geometric normal `ng` (unit, on the lit side).
-float light_visibility(sampler2D map, Light light, vec3 position_ws, vec3 ng, float softness, float angle)
+// Share of a light that reaches a point, by the view `v` of it that sees the point; `ng` is the surface's geometric normal
+// (unit, on the lit side). An empty texel holds either nothing's depth, 1e30 (shadow maps), or 0 (bounce maps).
+float light_visibility(sampler2D map, LightView v, vec3 position_ws, vec3 ng, float softness, float angle)
 {
-    if (light.views == 0) {
-        return 1.0;
-    }
-    LightView v = light_views[light_view_of(light, position_ws)];
     vec3 p = light_view_project(v, position_ws);
     vec2 unit = p.xy / v.guard;
     if (any(greaterThan(abs(unit), vec2(1.0))) || p.z <= v.near) {

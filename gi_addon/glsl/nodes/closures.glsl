@@ -4,14 +4,17 @@
 
 #include "lib/surface_lib.glsl"
 
-float surface_albedo_curve(SurfacePoint point, vec3 n, float roughness, float eta)
+// Albedo of a glossy layer towards the viewer, or to all sides.
+vec3 surface_layer_albedo(SurfacePoint point, vec3 n, vec3 f0, float f90, float roughness, float eta, float multiscatter)
 {
+    Lobe lobe = Lobe(f0, f90, roughness, eta, multiscatter);
+    float cos_v = saturate(abs(dot(n, point.view_ws)));
 #if SURFACE_TABLES == 2
-    return albedo_curve_average(brdf_average, roughness, eta);
+    return lobe_albedo_average(brdf_average, brdf_energy, lobe);
 #elif SURFACE_TABLES == 1
-    return albedo_curve(brdf_albedo, roughness, saturate(abs(dot(n, point.view_ws))), eta);
+    return lobe_albedo(brdf_albedo, brdf_average, brdf_energy, lobe, cos_v);
 #else
-    return fresnel_curve(saturate(abs(dot(n, point.view_ws))), eta);
+    return fresnel(lobe, cos_v);
 #endif
 }
 
@@ -36,7 +39,7 @@ Closure principled_closure(vec3 base, float metallic, float roughness, float ior
     vec3 layer_f0 = saturate(f0 * max(tint, vec3(0.0)));
     bool has_layer = eta > 1.0;
     vec3 layer_albedo =
-        has_layer ? mix(layer_f0, vec3(1.0), surface_albedo_curve(point, n, roughness, eta)) : vec3(0.0);
+        has_layer ? surface_layer_albedo(point, n, layer_f0, 1.0, roughness, eta, multiscatter) : vec3(0.0);
 
     Closure c = closure_none();
     c.diffuse = max(base, vec3(0.0)) * ((1.0 - metallic) * saturate(1.0 - max3(layer_albedo)));
@@ -59,7 +62,8 @@ void principled_transmission(inout Closure c, vec3 base, float metallic, float r
     ior = max(ior, 1e-5);
     float eta = ior < 1.0 ? 1.0 / ior : ior;
     vec3 f0 = saturate(f0_from_ior(ior) * max(tint, vec3(0.0)));
-    vec3 reflected = eta > 1.0 ? mix(f0, vec3(1.0), surface_albedo_curve(point, n, saturate(roughness), eta)) : vec3(0.0);
+    vec3 reflected =
+        eta > 1.0 ? surface_layer_albedo(point, n, f0, 1.0, saturate(roughness), eta, multiscatter) : vec3(0.0);
     // The opaque dielectric gives way; its specular layer already is the reflection.
     float share = 1.0 - saturate(metallic) > 0.0 ? weight / (1.0 - saturate(metallic)) : 0.0;
     c.diffuse *= 1.0 - share;
@@ -82,7 +86,9 @@ void principled_coat(inout Closure c, float weight, float roughness, float ior, 
     float eta = max(ior, 1.0);
     float f0 = f0_from_ior(eta);
     vec3 n = point.normal_ws;
-    float albedo = eta > 1.0 ? weight * mix(f0, 1.0, surface_albedo_curve(point, n, saturate(roughness), eta)) : 0.0;
+    // Cycles' coat is without multiple scattering.
+    float albedo =
+        eta > 1.0 ? weight * surface_layer_albedo(point, n, vec3(f0), 1.0, saturate(roughness), eta, 0.0).r : 0.0;
     // The tint is what passes the coat at normal incidence; the way through lengthens with the refracted angle.
     float cos_i = saturate(abs(dot(point.view_ws, n)));
     float cos_t = sqrt(1.0 - (1.0 - cos_i * cos_i) / (eta * eta));
@@ -111,7 +117,7 @@ Closure closure_glass(vec3 color, float roughness, float ior, vec3 n, SurfacePoi
     float eta = max(ior, 1e-5);
     eta = eta < 1.0 ? 1.0 / eta : eta;
     float f0 = f0_from_ior(eta);
-    float albedo = mix(f0, 1.0, surface_albedo_curve(point, n, saturate(roughness), eta));
+    float albedo = surface_layer_albedo(point, n, vec3(f0), 1.0, saturate(roughness), eta, 0.0).r;
     Closure c = closure_refraction(max(color, vec3(0.0)) * (1.0 - albedo), roughness, ior, n);
     c.f0 = max(color, vec3(0.0)) * f0;
     c.f90 = max(color, vec3(0.0));

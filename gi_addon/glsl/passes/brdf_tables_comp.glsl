@@ -1,7 +1,8 @@
 // Directional albedo of the GGX lobe, by quadrature over visible normals (weight G2/G1, Heitz 2018 eq. 19).
 //
-// table 0: brdf_albedo (roughness, cosθ, curve): where between f0 and f90 the albedo lies, as a fraction of the lobe
-//   without Fresnel, E[curve]/E[1]; curves are dielectrics of rising index, the last one Schlick's.
+// table 0: brdf_albedo (roughness, cosθ, curve): where between f0 and f90 the albedo lies. As Cycles defines its Glossy
+//   Color and the dimming of the layers below, this is the Fresnel curve's plain mean over visible normals, those that
+//   reflect below the horizon counting 0. Curves are dielectrics of rising index, the last one Schlick's.
 // table 1: brdf_average (roughness, curve): the same, averaged with weight 2 cosθ.
 // table 2: brdf_energy (roughness, cosθ): E without Fresnel, and its cosine-weighted average.
 
@@ -17,7 +18,7 @@ const int AVERAGE_STRATA = 16;
 
 float roughness_of(uint i, uint n) { return float(i) / float(n - 1u); }
 
-// (E[curve], E[1]) seen under cos_v.
+// (mean of the curve over visible normals, E without Fresnel) seen under cos_v.
 vec2 directional(float roughness, float cos_v, float eta)
 {
     cos_v = max(cos_v, 1e-4);
@@ -30,7 +31,7 @@ vec2 directional(float roughness, float cos_v, float eta)
         if (l.z > 0.0) {
             float lambda_v = ggx_lambda(cos_v, alpha);
             float weight = (1.0 + lambda_v) / (1.0 + lambda_v + ggx_lambda(l.z, alpha));
-            sum += weight * vec2(fresnel_curve(saturate(dot(v, h)), eta), 1.0);
+            sum += vec2(fresnel_curve(saturate(dot(v, h)), eta), weight);
         }
     }
     return sum / float(QUADRATURE);
@@ -55,7 +56,7 @@ void main()
         }
         float cos_v = roughness_of(id.y, uint(size.y));
         vec2 e = directional(roughness_of(id.x, uint(size.x)), cos_v, eta_of(int(id.z), size.z));
-        imageStore(brdf_albedo, ivec3(id), vec4(e.x / max(e.y, 1e-6)));
+        imageStore(brdf_albedo, ivec3(id), vec4(e.x));
     } else if (table == 1) {
         ivec2 size = imageSize(brdf_average);
         if (any(greaterThanEqual(ivec2(id.xy), size))) {
@@ -65,7 +66,7 @@ void main()
         for (int i = 0; i < AVERAGE_STRATA; ++i) {
             float cos_v = (float(i) + 0.5) / float(AVERAGE_STRATA);
             vec2 e = directional(roughness_of(id.x, uint(size.x)), cos_v, eta_of(int(id.y), size.y));
-            sum += 2.0 * cos_v * e.x / max(e.y, 1e-6);
+            sum += 2.0 * cos_v * e.x;
         }
         imageStore(brdf_average, ivec2(id.xy), vec4(sum / float(AVERAGE_STRATA)));
     } else {

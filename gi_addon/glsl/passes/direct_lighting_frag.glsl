@@ -46,9 +46,19 @@ void main()
                 continue;
             }
             float visible = 1.0;
+            if (light.views > 0) {
+                LightView v = light_views[light_view_of(light, position_ws)];
 #if HAS_SHADOW_DEPTH
-            visible = light_visibility(shadow_depth, light, position_ws, ng, softness, filter_turn);
+                if (v.map == MAP_SHADOW) {
+                    visible = light_visibility(shadow_depth, v, position_ws, ng, softness, filter_turn);
+                }
 #endif
+#if HAS_RSM_DEPTH
+                if (v.map == MAP_BOUNCE) {
+                    visible = light_visibility(rsm_depth, v, position_ws, ng, softness, filter_turn);
+                }
+#endif
+            }
             vec3 irradiance = arriving * cos_l;
             open_light += irradiance;
             lit_light += irradiance * visible;

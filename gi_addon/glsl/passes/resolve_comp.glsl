@@ -102,7 +102,8 @@ void main()
         vec4 packed_lobe = texelFetch(gbuf_lobe, pixel, 0);
         Lobe lobe = Lobe(specular.rgb, packed_lobe.g, specular.a, packed_lobe.r, packed_lobe.b);
         vec3 n = octahedral_decode(texelFetch(gbuf_normal, pixel, 0).xy);
-        glossy_color = lobe_albedo(brdf_albedo, lobe, saturate(abs(dot(n, view_direction_ws(uv)))));
+        float cos_v = saturate(abs(dot(n, view_direction_ws(uv))));
+        glossy_color = lobe_albedo(brdf_albedo, brdf_average, brdf_energy, lobe, cos_v);
     }
 #endif
     add(LAYER_GLOSSY_COLOR, pixel, vec4(glossy_color, 1.0));

@@ -24,7 +24,7 @@ void main()
 #if HAS_RSM_ALBEDO
     vec3 albedo = c.diffuse;
 #if SURFACE_TABLES > 0
-    albedo += lobe_albedo(brdf_albedo, closure_lobe(c), saturate(dot(n, to_light)));
+    albedo += lobe_albedo(brdf_albedo, brdf_average, brdf_energy, closure_lobe(c), saturate(dot(n, to_light)));
 #endif
     rsm_albedo = vec4(albedo * gain, 1.0);
 #endif

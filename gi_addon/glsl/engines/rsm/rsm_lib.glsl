@@ -26,10 +26,17 @@ RsmTexel rsm_texel(int index, ivec2 pixel)
         return t;
     }
     float depth = texelFetch(rsm_depth, pixel, 0).r;
-    vec2 texel = vec2(2.0 / v.rect.z, 2.0 / v.rect.w);
-    vec2 xy = (vec2(pixel) + 0.5 - v.rect.xy) * texel - 1.0;
+    vec2 texel = 2.0 * v.guard / v.rect.zw;
+    vec2 xy = (vec2(pixel) + 0.5 - v.rect.xy) * texel - v.guard;
+    // The margin around the light's own span belongs to its other views: of a texel across the border only the part
+    // inside counts, so that all views' texels sum to the light's flux.
+    vec2 low = clamp(xy - 0.5 * texel, vec2(-1.0), vec2(1.0));
+    vec2 high = clamp(xy + 0.5 * texel, vec2(-1.0), vec2(1.0));
+    if (any(lessThanEqual(high, low))) {
+        return t;
+    }
     float beam;
-    vec3 arriving = light_view_flux(v, light, xy, texel, depth, beam);
+    vec3 arriving = light_view_flux(v, light, 0.5 * (low + high), high - low, depth, beam);
     vec4 normals = texelFetch(rsm_normal, pixel, 0);
     vec3 n = octahedral_decode(normals.xy);
     t.position_ws = light_view_position(v, xy, depth);
