@@ -28,16 +28,34 @@ _INSTANCE_NAMES = tuple(f"instance_{name}" for name in _INSTANCE.names)
 
 _PARAMS_BINDING = 7
 _MAX_ATTRIBUTES = 4
+# Meshes above this many triangles are drawn in spatial chunks, so that a view skips those it can't see. A mesh that is
+# placed many times is not: its copies are skipped one by one already.
+_CHUNK_TRIANGLES = 1024
+_CHUNKED_PLACES = 8
 _ANISOTROPY = 1.0
 
 
 @dataclass
-class Batch:
-    """Draws of one material (or of all opaque ones, ``material`` −1): ``count`` commands from ``first``."""
+class DrawList:
+    """Indirect commands (N, 5) u4 sorted by material, which range of them each material has, and the world box of each:
+    ``materials`` lists the material of every batch (−1: all opaque ones together), ``batch`` (N,) the batch of every
+    command, ``center`` and ``half`` (N, 3)."""
 
-    material: int
-    first: int
-    count: int
+    commands: np.ndarray
+    materials: list[int]
+    batch: np.ndarray
+    center: np.ndarray
+    half: np.ndarray
+    buffer: moderngl.Buffer
+
+    def visible(self, clip_from_world: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The commands whose boxes touch the view volume of ``clip_from_world`` (column-major as for GLSL), and how
+        many of them each batch has."""
+        m = clip_from_world.reshape(4, 4).T.astype("f8")
+        planes = np.concatenate([m[3] + m[:3], m[3] - m[:3]])
+        distance = self.center @ planes[:, :3].T + planes[:, 3] + self.half @ np.abs(planes[:, :3]).T
+        seen = (distance >= 0.0).all(axis=1)
+        return self.commands[seen], np.bincount(self.batch[seen], minlength=len(self.materials))
 
 
 class MaterialSet:
@@ -69,7 +87,8 @@ class GPUScene:
         self._textures: dict[int, moderngl.Texture] = {}
         self._samplers: dict[tuple, moderngl.Sampler] = {}
         self._vaos: dict[tuple, moderngl.VertexArray] = {}
-        self._draws: dict[tuple, tuple[moderngl.Buffer, list[Batch]]] = {}
+        self._draws: dict[tuple, DrawList] = {}
+        self._chunks: list[list[tuple[int, int, int, np.ndarray]]] = []
         self._scene: Scene | None = None
         self.uploads: dict[str, int] = {}
 
@@ -85,7 +104,7 @@ class GPUScene:
             self._upload_params()
             self._material_key = material_key
             self._vaos.clear()
-            self._draws.clear()
+            self._drop_draws()
             self.uploads["materials"] = len(self.compiled)
         if self._world_key != scene.world.uid:
             self.world = compile_world(scene.world.graph)
@@ -102,6 +121,7 @@ class GPUScene:
         transform_key = (stamps["transforms"],)
         if transform_key != self._transform_key:
             self._upload_instances(scene)
+            self._drop_draws()
             self._transform_key = transform_key
             self.uploads["transforms"] = len(scene.instances)
 
@@ -138,7 +158,10 @@ class GPUScene:
         if total:
             normals[:, :3] = np.rint(np.concatenate([m.normals for m in meshes]) * 32767.0)
         self._buffer("normals", normals)
-        indices = [m.triangles.reshape(-1) for m in meshes] if meshes else []
+        places = np.bincount(scene.instances.mesh, minlength=len(meshes)) if len(meshes) else []
+        chunked = [_chunks(m, places[i] <= _CHUNKED_PLACES) for i, m in enumerate(meshes)]
+        self._chunks = [chunks for _, chunks in chunked]
+        indices = [triangles.reshape(-1) for triangles, _ in chunked]
         self._buffer("indices", np.concatenate(indices).astype("u4") if indices else np.zeros(3, "u4"))
         for name in [n for n in self._streams if n not in wanted]:
             self.gl.release(self._streams.pop(name), self._buffers.pop(f"attribute {name}", None))
@@ -168,8 +191,10 @@ class GPUScene:
         for (mesh, materials, visibility), members in keys.items():
             self._groups.append((mesh, materials, visibility, start, len(members)))
             start += len(members)
-        for buffer, _ in self._draws.values():
-            self.gl.release(buffer)
+        self._drop_draws()
+
+    def _drop_draws(self) -> None:
+        self.gl.release(*(draws.buffer for draws in self._draws.values()))
         self._draws.clear()
 
     def _upload_instances(self, scene: Scene) -> None:
@@ -225,40 +250,46 @@ class GPUScene:
 
         ``stages`` are the pass's shader files; ``options`` go to :meth:`_programs`.
         """
-        for material, program, vao, buffer, batch in self._prepared(planned, stages, visibility, options):
-            program["clip_from_world"].write(clip_from_world)
-            if material >= 0:
-                self._bind_material(program, self.compiled[material], self._bases[material], options["units"])
-            vao.render_indirect(buffer, moderngl.TRIANGLES, batch.count, batch.first)
+        draws, prepared = self._prepared(planned, stages, visibility, options)
+        commands, counts = draws.visible(clip_from_world)
+        if len(commands):
+            draws.buffer.write(np.ascontiguousarray(commands))
+        first = 0
+        for (material, program, vao), count in zip(prepared, counts, strict=True):
+            if count:
+                program["clip_from_world"].write(clip_from_world)
+                if material >= 0:
+                    self._bind_material(program, self.compiled[material], self._bases[material], options["units"])
+                vao.render_indirect(draws.buffer, moderngl.TRIANGLES, int(count), first)
+                first += int(count)
         self.unbind_images(options["units"], max((len(c.images) for c in self.compiled), default=0))
 
     def programs(self, planned: Planned, stages, visibility: int, **options) -> list:
         """The programs that :meth:`draw` will use, so that their uniforms can be set once."""
-        return list({id(p): p for _, p, *_ in self._prepared(planned, stages, visibility, options)}.values())
+        _, prepared = self._prepared(planned, stages, visibility, options)
+        return list({id(program): program for _, program, _ in prepared}.values())
 
-    def _prepared(self, planned: Planned, stages, visibility: int, options) -> list[tuple]:
+    def _prepared(self, planned: Planned, stages, visibility: int, options) -> tuple[DrawList, list[tuple]]:
+        """The draw list, and (material, program, vertex array) of each of its batches; kept with the pass."""
         full, units = options["full"], options["units"]
-        opaque_alone = not full
-        key = ("draws", visibility, full, self._mesh_key, self._material_key)
+        draws = self._draw_list(visibility, opaque_together=not full)
+        key = ("draws", visibility, full)
         cached = planned.programs.get(key)
-        if cached is not None and cached[0] is self._draw_list(visibility, opaque_alone)[0]:
-            if all(vao is self._vaos.get(vkey) for vkey, vao in cached[2]):
-                return cached[1]
-        buffer, batches = self._draw_list(visibility, opaque_alone)
+        if cached is not None and cached[0] is draws and all(self._vaos.get(k) is v for k, v in cached[2]):
+            return draws, cached[1]
         out, vaos = [], []
-        for batch in batches:
-            material = batch.material
+        for material in draws.materials:
             compiled = self.compiled[material] if material >= 0 else None
-            with_material = full or compiled is not None
-            program = self._program(planned, stages, compiled, with_material, units, options.get("defines", {}))
-            attributes = tuple(compiled.attributes[:_MAX_ATTRIBUTES]) if with_material and compiled else ()
+            program = self._program(planned, stages, compiled, units, options.get("defines", {}))
+            attributes = tuple(compiled.attributes[:_MAX_ATTRIBUTES]) if compiled else ()
             vkey, vao = self._vao(program, attributes)
-            out.append((material if with_material else -1, program, vao, buffer, batch))
+            out.append((material, program, vao))
             vaos.append((vkey, vao))
-        planned.programs[key] = (buffer, out, vaos)
-        return out
+        planned.programs[key] = (draws, out, vaos)
+        return draws, out
 
-    def _program(self, planned, stages, compiled: CompiledGraph | None, with_material, units: int, defines):
+    def _program(self, planned, stages, compiled: CompiledGraph | None, units: int, defines):
+        with_material = compiled is not None
         glsl = compiled.glsl if compiled else ""
         object_space = any(
             word in glsl for word in ("_os", "generated", "object_", "point.object", "world_from_object")
@@ -273,7 +304,7 @@ class GPUScene:
             "SURFACE_TRANSPARENT": int(bool(compiled and (compiled.transparent or compiled.transmissive))),
         }
         virtual = {**GENERATED, "generated/material.glsl": ""}
-        if with_material and compiled is not None:
+        if with_material:
             virtual["generated/material.glsl"] = material_source(compiled, units)
         return self.gl.program(
             planned.title,
@@ -283,36 +314,45 @@ class GPUScene:
             virtual=virtual,
         )
 
-    def _draw_list(self, visibility: int, opaque_alone: bool) -> tuple[moderngl.Buffer, list[Batch]]:
-        """Indirect commands of what ``visibility`` rays see. With ``opaque_alone`` opaque materials share a batch."""
-        key = (visibility, opaque_alone)
+    def _draw_list(self, visibility: int, *, opaque_together: bool) -> DrawList:
+        """Indirect commands of what ``visibility`` rays see."""
+        key = (visibility, opaque_together)
         if key in self._draws:
             return self._draws[key]
-        per_material: dict[int, list[tuple]] = {}
-        for mesh_index, materials, seen, first_instance, count in self._groups:
-            if not seen & visibility:
+        rows: list[tuple] = []
+        boxes: list[np.ndarray] = []
+        materials: dict[int, None] = {}
+        for mesh_index, used, seen, first_instance, count in self._groups:
+            if not seen & visibility or not used:
                 continue
-            mesh = self._scene.meshes[mesh_index]
-            for slot, first, triangles in mesh.slots:
-                if triangles == 0 or not materials:
-                    continue
-                material = materials[min(int(slot), len(materials) - 1)]
+            base, start = int(self._base_vertex[mesh_index]), int(self._first_index[mesh_index])
+            for slot, first, triangles, box in self._chunks[mesh_index]:
+                material = used[min(slot, len(used) - 1)]
                 compiled = self.compiled[material]
-                if opaque_alone and not (compiled.transparent or compiled.transmissive):
+                if opaque_together and not (compiled.transparent or compiled.transmissive):
                     material = -1
-                command = (
-                    3 * int(triangles), count, int(self._first_index[mesh_index]) + 3 * int(first),
-                    int(self._base_vertex[mesh_index]), first_instance,
-                )  # fmt: skip
-                per_material.setdefault(material, []).append(command)
-        commands: list[tuple] = []
-        batches: list[Batch] = []
-        for material in sorted(per_material):
-            batches.append(Batch(material, len(commands), len(per_material[material])))
-            commands += per_material[material]
-        data = np.array(commands or [(0,) * 5], "u4")
-        self._draws[key] = (self.gl.buffer("scene draw commands", data), batches)
+                materials[material] = None
+                rows.append((material, 3 * triangles, count, start + 3 * first, base, first_instance))
+                boxes.append(self._group_box(box, first_instance, count))
+        order = sorted(materials)
+        table = np.array(rows, "i8").reshape(-1, 6)
+        batch = np.searchsorted(order, table[:, 0]) if order else np.zeros(0, "i8")
+        sort = np.argsort(batch, kind="stable")
+        box = np.array(boxes, "f8").reshape(-1, 2, 3)[sort]
+        commands = table[sort, 1:].astype("u4")
+        buffer = self.gl.buffer("scene draw commands", size=max(1, len(commands)) * 20)
+        self._draws[key] = DrawList(
+            commands, order, batch[sort], box.mean(axis=1), (box[:, 1] - box[:, 0]) / 2.0, buffer
+        )
         return self._draws[key]
+
+    def _group_box(self, box: np.ndarray, first: int, count: int) -> np.ndarray:
+        """World box (2, 3) of a mesh part placed by ``count`` instances."""
+        matrix = self._scene.instances.matrix[self._order[first : first + count]]
+        center, half = box.mean(axis=0), (box[1] - box[0]) / 2.0
+        world_center = matrix[:, :3, :3] @ center + matrix[:, :3, 3]
+        world_half = np.abs(matrix[:, :3, :3]) @ half
+        return np.stack([(world_center - world_half).min(axis=0), (world_center + world_half).max(axis=0)])
 
     def _vao(self, program, attributes: tuple[str, ...]):
         key = (program.glo, attributes)
@@ -379,10 +419,41 @@ class GPUScene:
 
     def close(self) -> None:
         """Free all GPU memory of this scene."""
-        self.gl.release(*self._buffers.values(), *self._textures.values(), *(b for b, _ in self._draws.values()))
+        self.gl.release(*self._buffers.values(), *self._textures.values(), *(d.buffer for d in self._draws.values()))
         for vao in self._vaos.values():
             vao.release()
         self.__init__(self.gl)
+
+
+def _chunks(mesh: Mesh, split: bool) -> tuple[np.ndarray, list[tuple[int, int, int, np.ndarray]]]:
+    """A mesh's triangles in drawing order, and its parts: (slot, first triangle, count, box (2, 3) in object space)."""
+    parts: list[tuple[int, int, int, np.ndarray]] = []
+    triangles = mesh.triangles
+    split = split and len(triangles) > 2 * _CHUNK_TRIANGLES
+    if split:
+        triangles = triangles.copy()
+    for slot, first, count in mesh.slots.tolist():
+        if not split or count <= _CHUNK_TRIANGLES:
+            parts.append((slot, first, count, mesh.bounds))
+            continue
+        chunk = triangles[first : first + count]
+        centroid = mesh.positions[chunk].mean(axis=1)
+        order = np.argsort(_morton(centroid, mesh.bounds), kind="stable")
+        triangles[first : first + count] = chunk = chunk[order]
+        for start in range(0, count, _CHUNK_TRIANGLES):
+            points = mesh.positions[chunk[start : start + _CHUNK_TRIANGLES].reshape(-1)]
+            box = np.stack([points.min(axis=0), points.max(axis=0)]).astype("f8")
+            parts.append((slot, first + start, min(_CHUNK_TRIANGLES, count - start), box))
+    return triangles, parts
+
+
+def _morton(points: np.ndarray, bounds: np.ndarray) -> np.ndarray:
+    """Z-order codes of points in a box, 10 bits an axis."""
+    size = np.where(bounds[1] > bounds[0], bounds[1] - bounds[0], 1.0)
+    cell = np.clip((points - bounds[0]) / size * 1023.0, 0, 1023).astype(np.uint32)
+    for shift, mask in ((16, 0x030000FF), (8, 0x0300F00F), (4, 0x030C30C3), (2, 0x09249249)):
+        cell = (cell | (cell << np.uint32(shift))) & np.uint32(mask)
+    return cell[:, 0] | (cell[:, 1] << np.uint32(1)) | (cell[:, 2] << np.uint32(2))
 
 
 def material_source(compiled: CompiledGraph, units: int) -> str:

@@ -8,7 +8,9 @@ own; with one sub-frame every light is its centre.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -29,7 +31,7 @@ from .gpu_types import (
     SHAPE_ELLIPSE,
     SHAPE_RECTANGLE,
 )
-from .scene import Light
+from .scene import DIFFUSE, Light, Scene
 from .sequence import sobol_2d
 from .world_map import WorldMap
 
@@ -63,6 +65,28 @@ class Emitters:
     def none() -> Emitters:
         return Emitters(np.zeros((0, 3, 3)), np.zeros((0, 3)))
 
+    @staticmethod
+    def of(scene: Scene, emission: Sequence[np.ndarray]) -> Emitters:
+        """The emissive triangles of ``scene``; ``emission`` is the mean radiance (3,) of each material. Triangles
+        without area are left out."""
+        corners, radiance = [], []
+        inst = scene.instances
+        for i in range(len(inst)):
+            mesh, used = scene.meshes[inst.mesh[i]], inst.materials[i]
+            if not inst.visibility[i] & DIFFUSE or not np.isfinite(inst.matrix[i]).all() or not used:
+                continue
+            for slot, first, count in mesh.slots:
+                value = emission[used[min(int(slot), len(used) - 1)]]
+                if count and (value > 0.0).any():
+                    triangles = mesh.positions[mesh.triangles[first : first + count]].astype("f8")
+                    corners.append(triangles @ inst.matrix[i, :3, :3].T + inst.matrix[i, :3, 3])
+                    radiance.append(np.broadcast_to(value, (count, 3)))
+        if not corners:
+            return Emitters.none()
+        found = Emitters(np.concatenate(corners), np.concatenate(radiance))
+        solid = found.areas() > 0.0
+        return Emitters(found.corners[solid], found.radiance[solid])
+
     def __len__(self) -> int:
         return len(self.corners)
 
@@ -71,6 +95,16 @@ class Emitters:
         a = self.corners[:, 1] - self.corners[:, 0]
         b = self.corners[:, 2] - self.corners[:, 0]
         return 0.5 * np.linalg.norm(np.cross(a, b), axis=1)
+
+    @cached_property
+    def share(self) -> np.ndarray:
+        """Each triangle's share (T,) of the luminous power, by which points are drawn."""
+        power = self.areas() * (self.radiance @ np.array([0.2126, 0.7152, 0.0722]))
+        return power / power.sum()
+
+    @cached_property
+    def cumulative(self) -> np.ndarray:
+        return np.cumsum(self.share)
 
 
 @dataclass
@@ -253,9 +287,7 @@ class LightRig:
         out["patch_radius"] = np.sqrt(max(area, 0.0) / np.pi) * share
 
     def _place_on_mesh(self, out: np.ndarray, source: Source, u: np.ndarray, subframes: int) -> None:
-        areas = self.emitters.areas()
-        power = areas * (self.emitters.radiance @ np.array([0.2126, 0.7152, 0.0722]))
-        cdf = np.cumsum(power) / power.sum()
+        cdf = self.emitters.cumulative
         index = int(np.searchsorted(cdf, u[0], side="right").clip(0, len(cdf) - 1))
         low = cdf[index - 1] if index else 0.0
         # The rest of the number that chose the triangle is as good as new.
@@ -265,8 +297,8 @@ class LightRig:
         normal = _unit(np.cross(b - a, c - a))
         frame = _frame(normal)
         out["axis_ws"], out["u_ws"], out["v_ws"] = normal, frame[0], frame[1]
-        probability = power[index] / power.sum()
-        share = areas[index] / (probability * source.count)
+        area = 0.5 * np.linalg.norm(np.cross(b - a, c - a))
+        share = area / (self.emitters.share[index] * source.count)
         out["emission"] = self.emitters.radiance[index] * share
         out["spread_tan"], out["spread_scale"] = spread_profile(0.5 * np.pi)
         out["flags"] |= LIGHT_FLAG_SHADOW
@@ -388,7 +420,7 @@ def build_rig(
     if len(emitters) and area_lights:
         sources += [Source(LIGHT_MESH, 12, None, 6, True, k, emitter_samples) for k in range(emitter_samples)]
 
-    def tiles(resolution: int, used) -> Maps:
+    def tiles(resolution: int, used, *, bounce: bool) -> Maps:
         sizes: list[int] = []
         first: list[int] = []
         for source in sources:
@@ -396,7 +428,10 @@ def build_rig(
                 first.append(-1)
                 continue
             first.append(len(sizes))
-            base = min(resolution, world_resolution) if source.kind == LIGHT_WORLD else resolution
+            base = resolution
+            if source.kind == LIGHT_WORLD:
+                # The sky's bounce needs no detail: its many directions blur it. Materials are dear to draw, depth is not.
+                base = min(resolution, world_resolution // 2 if bounce else world_resolution)
             size = base if source.views == 1 else base // 2
             sizes += [max(16, size)] * source.views
         while sum(s * s for s in sizes) > texel_budget and max(sizes) > 16:
@@ -408,11 +443,12 @@ def build_rig(
         if not shadows or (source.light is not None and not source.light.use_shadow):
             return False
         # What is drawn anew in each sub-frame anyway, at the very point that direct light comes from, is drawn once.
-        return not (bounces and source.kind in (LIGHT_AREA, LIGHT_MESH, LIGHT_WORLD))
+        return not (bounces and source.kind in (LIGHT_AREA, LIGHT_MESH))
 
     return LightRig(
         sources, bounds, world, emitters,
-        tiles(shadow_resolution, own_shadow_map), tiles(bounce_resolution, lambda s: bounces), notes,
+        tiles(shadow_resolution, own_shadow_map, bounce=False), tiles(bounce_resolution, lambda s: bounces, bounce=True),
+        notes,
     )  # fmt: skip
 
 

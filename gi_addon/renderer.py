@@ -23,7 +23,7 @@ from .gpu_scene import GPUScene, world_source
 from .gpu_types import GENERATED, VIEW
 from .graph import Plan, plan
 from .lights import Emitters
-from .materials import compile_surface, compile_world
+from .materials import CompiledGraph, compile_surface, compile_world, mean_emission
 from .outputs import OUTPUTS, develop
 from .scene import Camera, Scene
 from .settings import Settings
@@ -69,6 +69,7 @@ class Renderer:
         self._planned_key: tuple | None = None
         self._plan: Plan | None = None
         self._world_maps: tuple[tuple, WorldMap | None] | None = None
+        self._emitter_cache: tuple[tuple, Emitters] | None = None
         self.frame: Frame | None = None
 
     # -- one frame -----------------------------------------------------------------------------------------------
@@ -112,7 +113,8 @@ class Renderer:
         size = (int(region[2]), int(region[3]))
         subframes = subframes or settings.samples
         facts = gather_facts(
-            scene, self.gpu.compiled, settings, size, outputs, subframes, self._world_map(scene), Emitters.none()
+            scene, self.gpu.compiled, settings, size, outputs, subframes, self._world_map(scene),
+            self._emitters(scene, stamps),
         )
         facts.stamps = stamps
         key = (
@@ -147,7 +149,7 @@ class Renderer:
         if [r.name for r in old.reads] == [r.name for r in planned.reads] and [w.name for w in old.writes] == [
             w.name for w in planned.writes
         ]:
-            planned.programs = {k: v for k, v in old.programs.items() if k[0] != "draws"}
+            planned.programs = dict(old.programs)
 
     def subframe(self, index: int) -> None:
         """Render sub-frame ``index`` into the film. Static passes run if what they depend on has changed."""
@@ -228,6 +230,12 @@ class Renderer:
             self._screen_vaos[program.glo] = self.gl.ctx.vertex_array(program, [])
         return self._screen_vaos[program.glo]
 
+    def _emitters(self, scene: Scene, stamps: dict[str, str]) -> Emitters:
+        key = (stamps["meshes"], stamps["transforms"], stamps["materials"])
+        if self._emitter_cache is None or self._emitter_cache[0] != key:
+            self._emitter_cache = (key, find_emitters(scene, self.gpu.compiled))
+        return self._emitter_cache[1]
+
     def _world_map(self, scene: Scene) -> WorldMap | None:
         """The world as a map, evaluated on the GPU unless it is one colour."""
         key = (scene.world.uid,)
@@ -275,6 +283,15 @@ class Renderer:
         self.frame = self._plan = None
 
 
+def find_emitters(scene: Scene, compiled: list[CompiledGraph]) -> Emitters:
+    """The scene's emissive triangles."""
+    emission = [
+        mean_emission(m.graph, scene.images) if c.emissive else np.zeros(3)
+        for m, c in zip(scene.materials, compiled, strict=True)
+    ]
+    return Emitters.of(scene, emission) if any((e > 0.0).any() for e in emission) else Emitters.none()
+
+
 def render(
     scene: Scene,
     settings: Settings | None = None,
@@ -313,6 +330,6 @@ def inspect(
     world_map = None if black else WorldMap(np.ones((16, 32, 3)))
     outputs = tuple(outputs)
     facts: Facts = gather_facts(
-        scene, compiled, settings, resolution, outputs, settings.samples, world_map, Emitters.none()
+        scene, compiled, settings, resolution, outputs, settings.samples, world_map, find_emitters(scene, compiled)
     )
     return plan(TECHNIQUES[settings.technique](settings, facts.layers), facts, {"film": ", ".join(outputs)})

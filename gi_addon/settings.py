@@ -100,7 +100,7 @@ class WorldSettings:
         low=1, high=64, higher="smoother sky light", lower="faster",
     )  # fmt: skip
     resolution: int = _setting(
-        256, "Resolution", "Texels along one side of those shadow maps", low=64, high=4096, unit="px",
+        512, "Resolution", "Texels along one side of those shadow maps", low=64, high=4096, unit="px",
         higher="finer openings", lower="faster, leaks through small walls",
     )  # fmt: skip
 

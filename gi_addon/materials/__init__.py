@@ -2,5 +2,6 @@
 """Shader graphs to GLSL: a material is one generated function that every pass drawing surfaces includes."""
 
 from .compiler import CompiledGraph, compile_surface, compile_world
+from .means import mean_emission
 
-__all__ = ["CompiledGraph", "compile_surface", "compile_world"]
+__all__ = ["CompiledGraph", "compile_surface", "compile_world", "mean_emission"]

@@ -42,6 +42,6 @@ class DirectLighting(Pass):
             program,
             light_count=len(planned.facts.rig.sources),
             softness=planned.facts.settings.shadows.softness,
-            filter_turn=float(sobol_2d(frame.subframe, 3)[0]) * 1.5707963,
+            filter_turn=float(sobol_2d(frame.subframe, 3)[0]) * 6.2831853,
         )
         frame.screen(planned, program)

@@ -57,6 +57,9 @@ vec3 light_arriving(Light light, vec3 position_ws, out vec3 l, out float angle)
         // ("soft falloff" off) is I/d².
         vec3 to_center = light.center_ws - position_ws;
         distance2 = dot(to_center, to_center) + light.soft_radius2;
+    } else {
+        // The patch is a disc of its own area: π r² L / (d² + r²) facing it, bounded where the point would not be.
+        distance2 += sqr(light.patch_radius);
     }
     return light_intensity(light, -l) / max(distance2, 1e-37);
 }

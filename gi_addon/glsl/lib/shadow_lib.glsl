@@ -82,22 +82,72 @@ vec2 shadow_compare(sampler2D map, ReceiverPlane plane, vec2 texel, vec2 receive
     return vec2(dot(weight, lit), dot(weight, vec4(1.0)));
 }
 
+// Points of a spiral that fills the unit disc evenly (H. Vogel, 1979); `turn` rotates it.
+vec2 vogel_disc(int i, int count, float turn)
+{
+    float r = sqrt((float(i) + 0.5) / float(count));
+    float phi = 2.39996323 * float(i) + turn; // the golden angle, π (3 − √5)
+    return r * vec2(cos(phi), sin(phi));
+}
+
 // 3 × 3 bilinear comparisons cover a filter of radius `softness` texels without gaps up to 1.5; wider ones lean on the
 // sub-frames' rotation.
-float shadow_filtered(sampler2D map, LightView v, ReceiverPlane plane, vec2 texel, float softness, float angle)
+vec2 shadow_narrow(sampler2D map, LightView v, ReceiverPlane plane, vec2 texel, float softness, float turn)
 {
     vec2 low = v.rect.xy + 0.5;
     vec2 high = v.rect.xy + v.rect.zw - 0.5;
-    mat2 turn = mat2(cos(angle), sin(angle), -sin(angle), cos(angle));
+    mat2 rotation = mat2(cos(turn), sin(turn), -sin(turn), cos(turn));
     vec2 sum = vec2(0.0);
     int reach = softness > 0.0 ? 1 : 0;
     for (int y = -reach; y <= reach; ++y) {
         for (int x = -reach; x <= reach; ++x) {
-            vec2 tap = clamp(texel + turn * (vec2(x, y) * (softness * (2.0 / 3.0))), low, high); // 9 taps span 2 r
+            // Nine taps span twice the radius.
+            vec2 tap = clamp(texel + rotation * (vec2(x, y) * (softness * (2.0 / 3.0))), low, high);
             sum += shadow_compare(map, plane, tap, texel);
         }
     }
-    return sum.y > 1e-4 ? sum.x / sum.y : 1.0;
+    return sum;
+}
+
+// A light's point stands for a patch of its source, and a patch throws a penumbra: as wide as the patch looks from the
+// blocker (R. Fernando, "Percentage-Closer Soft Shadows", SIGGRAPH 2005 sketch). In the measure that is linear over the
+// map (depth, or 1/depth from a point) that width is patch × (blocker − receiver), so one formula serves both.
+const int BLOCKER_TAPS = 8;
+const int PENUMBRA_TAPS = 12;
+const float WIDEST_PENUMBRA = 24.0; // texels; more would need more taps than these to stay without noise
+
+vec2 shadow_wide(sampler2D map, LightView v, ReceiverPlane plane, vec2 texel, float softness, float per_measure,
+                 float search, float turn)
+{
+    vec2 low = v.rect.xy + 0.5;
+    vec2 high = v.rect.xy + v.rect.zw - 0.5;
+    float sum = 0.0;
+    float count = 0.0;
+    for (int i = 0; i < BLOCKER_TAPS; ++i) {
+        vec2 tap = clamp(texel + search * vogel_disc(i, BLOCKER_TAPS, turn), low, high);
+        ivec2 pixel = ivec2(floor(tap));
+        float d = texelFetch(map, pixel, 0).r;
+        d = d == 0.0 ? 1e30 : d;
+        float at = plane.value + dot(plane.gradient, vec2(pixel) + 0.5 - texel);
+        float gap = plane.inverse ? 1.0 / d - at : at - d;
+        if (gap > plane.bias) {
+            sum += gap;
+            count += 1.0;
+        }
+    }
+    if (count == 0.0) {
+        return shadow_narrow(map, v, plane, texel, softness, turn);
+    }
+    float radius = clamp(per_measure * sum / count, softness, search);
+    if (radius <= 1.5) {
+        return shadow_narrow(map, v, plane, texel, radius, turn);
+    }
+    vec2 lit = vec2(0.0);
+    for (int i = 0; i < PENUMBRA_TAPS; ++i) {
+        vec2 tap = clamp(texel + radius * vogel_disc(i, PENUMBRA_TAPS, turn), low, high);
+        lit += shadow_compare(map, plane, tap, texel);
+    }
+    return lit;
 }
 
 // Which of a light's views sees a point: the face with the largest depth.
@@ -119,9 +169,10 @@ int light_view_of(Light light, vec3 position_ws)
     return best;
 }
 
-// Share of a light that reaches a point, by the view `v` of it that sees the point; `ng` is the surface's geometric normal
-// (unit, on the lit side). An empty texel holds either nothing's depth, 1e30 (shadow maps), or 0 (bounce maps).
-float light_visibility(sampler2D map, LightView v, vec3 position_ws, vec3 ng, float softness, float angle)
+// Share of a light that reaches a point, by the view `v` of it that sees the point. `ng` is the surface's geometric normal
+// (unit, on the lit side); `softness` the filter's least radius in texels; `turn` the taps' rotation at this pixel, rad.
+// An empty texel holds nothing's depth, 1e30, in shadow maps and 0 in bounce maps.
+float light_visibility(sampler2D map, Light light, LightView v, vec3 position_ws, vec3 ng, float softness, float turn)
 {
     vec3 p = light_view_project(v, position_ws);
     vec2 unit = p.xy / v.guard;
@@ -129,5 +180,13 @@ float light_visibility(sampler2D map, LightView v, vec3 position_ws, vec3 ng, fl
         return 1.0; // nothing of the scene lies outside a light's map, or nearer than it shows
     }
     vec2 texel = v.rect.xy + (unit * 0.5 + 0.5) * v.rect.zw;
-    return shadow_filtered(map, v, receiver_plane(v, position_ws, ng, p.z), texel, softness, angle);
+    ReceiverPlane plane = receiver_plane(v, position_ws, ng, p.z);
+    // Texels of penumbra per unit of the linear measure, and the widest one that a blocker at the near plane could throw.
+    float axis = max(length(v.axis_x), length(v.axis_y));
+    float per_measure = light.patch_radius / (axis * 2.0 * v.guard / v.rect.z);
+    float widest = per_measure * (plane.inverse ? 1.0 / max(v.near, 1e-20) - plane.value : plane.value);
+    vec2 lit = widest > max(softness, 1.0)
+                   ? shadow_wide(map, v, plane, texel, softness, per_measure, min(widest, WIDEST_PENUMBRA), turn)
+                   : shadow_narrow(map, v, plane, texel, softness, turn);
+    return lit.y > 1e-4 ? lit.x / lit.y : 1.0;
 }

@@ -6,6 +6,7 @@
 
 #include "lib/view_lib.glsl"
 #include "lib/bsdf_lib.glsl"
+#include "lib/sequence_lib.glsl"
 #include "lib/shadow_lib.glsl"
 
 // GGX alpha after convolution with a uniform disc of angular radius θ: the half vector turns half as far as the light,
@@ -16,7 +17,9 @@ void main()
 {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
     vec2 uv = gl_FragCoord.xy * view.inverse_resolution;
-    float depth = texelFetch(gbuf_depth, pixel, 0).r;
+    vec2 depth_bulge = texelFetch(gbuf_depth, pixel, 0).rg;
+    float depth = depth_bulge.r;
+    float turn = filter_turn + TAU * unit_float(hash_u32(uvec2(pixel + view.pixel_offset)));
     vec3 diffuse = vec3(0.0);
     vec3 glossy = vec3(0.0);
     vec3 open_light = vec3(0.0);
@@ -41,21 +44,25 @@ void main()
             float angle;
             vec3 arriving = light_arriving(light, position_ws, l, angle);
             float cos_l = dot(n, l);
-            // Light from behind the triangle does not reach its front, whatever the shading normal says.
-            if (cos_l <= 0.0 || dot(ng, l) <= 0.0 || max3(arriving) <= 0.0) {
+            // Light from behind a flat triangle does not reach its front, whatever the shading normal says. A triangle
+            // that stands for a curved surface is lit up to where that surface turns away.
+            bool behind = dot(ng, l) <= 0.0;
+            if (cos_l <= 0.0 || (behind && depth_bulge.g <= 0.0) || max3(arriving) <= 0.0) {
                 continue;
             }
+            vec3 receiver_ws = position_ws + n * depth_bulge.g;
+            vec3 receiver_ng = behind ? n : ng;
             float visible = 1.0;
             if (light.views > 0) {
                 LightView v = light_views[light_view_of(light, position_ws)];
 #if HAS_SHADOW_DEPTH
                 if (v.map == MAP_SHADOW) {
-                    visible = light_visibility(shadow_depth, v, position_ws, ng, softness, filter_turn);
+                    visible = light_visibility(shadow_depth, light, v, receiver_ws, receiver_ng, softness, turn);
                 }
 #endif
 #if HAS_RSM_DEPTH
                 if (v.map == MAP_BOUNCE) {
-                    visible = light_visibility(rsm_depth, v, position_ws, ng, softness, filter_turn);
+                    visible = light_visibility(rsm_depth, light, v, receiver_ws, receiver_ng, softness, turn);
                 }
 #endif
             }

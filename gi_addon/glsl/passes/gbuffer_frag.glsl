@@ -26,7 +26,9 @@ void main()
     if (dot(n, n) < 0.5) {
         n = p.normal_ws;
     }
-    gbuf_depth = depth;
+    // Rounding of the interpolants alone lifts flat triangles by parts in a million of their place.
+    float bulge = surface_bulge();
+    gbuf_depth = vec2(depth, bulge > 1e-5 * length(vary_relative_ws) ? bulge : 0.0);
 #if HAS_GBUF_NORMAL
     gbuf_normal = vec4(octahedral_encode(n), octahedral_encode(p.geometric_normal_ws));
 #endif

@@ -6,6 +6,8 @@
 
 in vec3 vary_position_ws;
 in vec3 vary_normal_ws;
+in float vary_height;
+in vec3 vary_relative_ws;
 #if SURFACE_OBJECT_SPACE
 in vec3 vary_position_os;
 in vec3 vary_normal_os;
@@ -52,6 +54,12 @@ SurfacePoint surface_point(vec3 view_ws)
 #endif
     return p;
 }
+
+// How far the smooth surface that the vertex normals suggest stands above the triangle, along the normal; 0 where it is
+// flat or hollow. Moving the point to each vertex's tangent plane by its weight rises by Σ wᵢ (vᵢ − p)·nᵢ, and half of
+// that is the quadratic arc through the vertices (T. Boubekeur and M. Alexa, "Phong Tessellation", SIGGRAPH Asia 2008,
+// with α = ½, which is exact for spheres). The sum is Σ wᵢ vᵢ·nᵢ − p·Σ wᵢ nᵢ: both interpolate.
+float surface_bulge() { return max(0.5 * (vary_height - dot(vary_relative_ws, vary_normal_ws)), 0.0); }
 
 // How much of the surface stops a ray: what is neither cut out nor see-through. Refracting surfaces count as
 // see-through to the maps that only ask what blocks light (SURFACE_SEE_THROUGH_GLASS).

@@ -13,6 +13,8 @@ uniform mat4 clip_from_world;
 in ivec4 in_normal; // unit vector × 32767
 out vec3 vary_position_ws;
 out vec3 vary_normal_ws;
+out float vary_height; // dot(vertex − instance origin, vertex normal), see surface_bulge
+out vec3 vary_relative_ws; // position − instance origin
 #if SURFACE_OBJECT_SPACE
 in vec3 instance_texspace_min;
 in vec3 instance_texspace_scale;
@@ -63,6 +65,10 @@ void main()
     cofactor *= size > 0.0 ? mirrored * inversesqrt(size) : 0.0;
     vec3 normal_os = vec3(in_normal.xyz) * (1.0 / 32767.0);
     vary_normal_ws = cofactor * normal_os;
+    float l2 = dot(vary_normal_ws, vary_normal_ws);
+    vary_normal_ws *= l2 > 0.0 ? inversesqrt(l2) : 0.0;
+    vary_relative_ws = m * in_position;
+    vary_height = dot(vary_relative_ws, vary_normal_ws);
 #if SURFACE_OBJECT_SPACE
     vary_position_os = in_position;
     vary_normal_os = normal_os;

@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a material emits on average: a walk over the graph with numbers instead of GLSL.
+
+Emissive surfaces are drawn as light sources before any of their points is shaded, so their power must be known without
+the GPU. Textures count by their mean; what can't be evaluated counts as its best constant.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from ..scene import Image, Link, Node, ShaderGraph
+
+_GRAY = np.array([0.2126, 0.7152, 0.0722])
+_BINARY: dict[str, Callable] = {
+    "ADD": operator.add, "SUBTRACT": operator.sub, "MULTIPLY": operator.mul, "MINIMUM": np.minimum,
+    "MAXIMUM": np.maximum, "LESS_THAN": lambda a, b: float(a < b), "GREATER_THAN": lambda a, b: float(a > b),
+    "DIVIDE": lambda a, b: a / b if b else 0.0, "POWER": lambda a, b: abs(a) ** b if a else 0.0,
+}  # fmt: skip
+
+
+def mean_emission(graph: ShaderGraph, images: Sequence[Image]) -> np.ndarray:
+    """Mean emitted radiance (3,), W/(m²·sr), of a surface graph."""
+    if graph.surface is None:
+        return np.zeros(3)
+    return _Walk(graph, images).closure(graph.surface, 0)
+
+
+class _Walk:
+    def __init__(self, graph: ShaderGraph, images: Sequence[Image]) -> None:
+        self.graph, self.images = graph, images
+
+    def closure(self, link: Link | None, depth: int) -> np.ndarray:
+        if not isinstance(link, Link) or depth > 64:
+            return np.zeros(3)
+        node = self.graph.nodes[link.node]
+        get = node.inputs.get
+        if node.kind == "EMISSION":
+            return self.color(get("Color", 1.0), depth) * self.number(get("Strength", 1.0), depth)
+        if node.kind == "BSDF_PRINCIPLED":
+            strength = self.number(get("Emission Strength", 0.0), depth) * self.number(get("Alpha", 1.0), depth)
+            return self.color(get("Emission Color", 1.0), depth) * strength
+        if node.kind == "ADD_SHADER":
+            return self.closure(get("Shader"), depth + 1) + self.closure(get("Shader_001"), depth + 1)
+        if node.kind == "MIX_SHADER":
+            t = float(np.clip(self.number(get("Fac", 0.5), depth), 0.0, 1.0))
+            a, b = self.closure(get("Shader"), depth + 1), self.closure(get("Shader_001"), depth + 1)
+            return a * (1.0 - t) + b * t
+        return np.zeros(3)
+
+    def number(self, value, depth: int) -> float:
+        v = self.value(value, depth + 1)
+        return float(v @ _GRAY) if np.ndim(v) else float(v)
+
+    def color(self, value, depth: int) -> np.ndarray:
+        return np.broadcast_to(np.asarray(self.value(value, depth + 1), "f8"), (3,)).astype("f8")
+
+    def value(self, value, depth: int):
+        """A float or (3,) array."""
+        if not isinstance(value, Link):
+            return np.array(value[:3], "f8") if isinstance(value, tuple) else float(value)
+        if depth > 64:
+            return 1.0
+        node = self.graph.nodes[value.node]
+        get = node.inputs.get
+        if node.kind in ("TEX_IMAGE", "TEX_ENVIRONMENT"):
+            return self._image(node, value.output)
+        if node.kind in ("RGB", "VALUE"):
+            v = node.params.get("value", 0.5)
+            return np.array(v[:3], "f8") if isinstance(v, tuple) else float(v)
+        if node.kind == "MATH" and node.params.get("operation") in _BINARY:
+            a, b = self.number(get("Value", 0.5), depth), self.number(get("Value_001", 0.5), depth)
+            return float(_BINARY[node.params["operation"]](a, b))
+        if node.kind == "MIX":
+            suffix = {"RGBA": "Color", "VECTOR": "Vector"}.get(node.params.get("data_type"), "Float")
+            return self._blend(node.params.get("blend_type", "MIX") if suffix == "Color" else "MIX",
+                               get("Factor_Float", 0.5), get(f"A_{suffix}", 0.5), get(f"B_{suffix}", 0.5), depth)  # fmt: skip
+        if node.kind == "MIX_RGB":
+            return self._blend(node.params.get("blend_type", "MIX"), get("Fac", 0.5), get("Color1", 0.5),
+                               get("Color2", 0.5), depth)  # fmt: skip
+        if node.kind == "VALTORGB" and node.params.get("table"):
+            return np.mean([row[:3] for row in node.params["table"]], axis=0)
+        if node.kind == "LIGHT_PATH":
+            return 0.0 if value.output == "Is Camera Ray" else 1.0
+        for name in ("Color", "Color1", "Value", "Fac", "Vector"):
+            if isinstance(get(name), Link):
+                return self.value(get(name), depth + 1)
+        return 0.5
+
+    def _blend(self, mode: str, factor, a, b, depth: int):
+        t = float(np.clip(self.number(factor, depth), 0.0, 1.0))
+        x, y = self.color(a, depth), self.color(b, depth)
+        mixed = {"MULTIPLY": x * y, "ADD": x + y, "SUBTRACT": x - y}.get(mode, y)
+        return x * (1.0 - t) + mixed * t
+
+    def _image(self, node: Node, output: str):
+        index = node.params.get("image")
+        if index is None or index >= len(self.images):
+            return 0.0 if output == "Alpha" else np.zeros(3)
+        mean = image_mean(self.images[index])
+        return float(mean[3]) if output == "Alpha" else mean[:3]
+
+
+_means: dict[int, np.ndarray] = {}
+
+
+def image_mean(image: Image) -> np.ndarray:
+    """Mean of an image's linear pixels (4,)."""
+    if image.uid not in _means:
+        # A few thousand texels are enough for a mean.
+        step = max(1, int(np.sqrt(image.pixels.shape[0] * image.pixels.shape[1] / 65536.0)))
+        pixels = image.pixels[::step, ::step].reshape(-1, 4).astype("f8")
+        if image.pixels.dtype == np.uint8:
+            pixels = pixels / 255.0
+        if image.colorspace == "srgb":
+            rgb = pixels[:, :3]
+            pixels[:, :3] = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
+        if len(_means) > 4096:
+            _means.clear()
+        _means[image.uid] = np.nan_to_num(pixels).mean(axis=0)
+    return _means[image.uid]
