@@ -292,6 +292,15 @@ class Scene:
             "camera": digest(_plain(self.camera)),
         }
 
+    def digest(self) -> str:
+        """A name of the scene's content, the same in every process (unlike stamps)."""
+        arrays: dict[str, np.ndarray] = {}
+        text = json.dumps(_encode(self, arrays, ""), sort_keys=True)
+        h = hashlib.blake2b(text.encode(), digest_size=16)
+        for key in sorted(arrays):
+            h.update(key.encode() + np.ascontiguousarray(arrays[key]).tobytes())
+        return h.hexdigest()
+
     # -- snapshots -----------------------------------------------------------------------------------------------
 
     def save(self, path: str | Path) -> None:

@@ -21,6 +21,9 @@ _IDENTIFIER = re.compile(r"\b[A-Za-z_]\w*\b")
 _COMMENT = re.compile(r"//.*$|/\*.*?\*/")
 # Mesa: "3:10(52): error: ..."; NVIDIA: "3(10) : error C0000: ..."; AMD and Intel: "ERROR: 3:10: ...".
 _MESSAGE = re.compile(r"^(?:ERROR:\s*|WARNING:\s*)?(\d+)(?::(\d+)(?:\((\d+)\))?|\((\d+)\))\s*:\s*(.*)$")
+# Some compilers forget the file number of ``#line`` in half of their messages; the line number survives everywhere, so
+# it carries both: file × this + line.
+_FILE_STRIDE = 100_000
 _MACROS_OF_GLSL = {"defined", "GL_core_profile", "__VERSION__", "GL_es_profile"}
 
 
@@ -38,7 +41,8 @@ class Source:
             match = _MESSAGE.match(raw.strip())
             if not match:
                 continue
-            index, line, text = int(match[1]), int(match[2] or match[4]), match[5]
+            index, line = divmod(int(match[2] or match[4]), _FILE_STRIDE)
+            text = match[5]
             name = self.files[index] if index < len(self.files) else f"source {index}"
             lines.append(f"  {name}:{line}: {text}")
             excerpt = self._line(index, line)
@@ -50,14 +54,14 @@ class Source:
 
     def _line(self, index: int, line: int) -> str:
         """The text at ``line`` of file ``index``, found by replaying the ``#line`` directives."""
-        current, number = 0, 0
+        current = 0
         for text in self.text.splitlines():
-            directive = re.match(r"^#line (\d+) (\d+)$", text)
+            directive = re.match(r"^#line (\d+)$", text)
             if directive:
-                number, current = int(directive[1]) - 1, int(directive[2])
+                current = int(directive[1]) - 1
                 continue
-            number += 1
-            if current == index and number == line:
+            current += 1
+            if current == index * _FILE_STRIDE + line:
                 return text
         return ""
 
@@ -117,12 +121,12 @@ class ShaderLibrary:
             raise ShaderError(f"{origin}: {error}" if origin else str(error)) from None
         index = len(files)
         files.append(path)
-        out.append(f"#line 1 {index}")
+        out.append(f"#line {index * _FILE_STRIDE + 1}")
         for number, line in enumerate(text.splitlines(), start=1):
             include = _INCLUDE.match(line)
             if include:
                 self._append(include[1], out, files, seen, known, virtual, f"{path}:{number}")
-                out.append(f"#line {number + 1} {index}")
+                out.append(f"#line {index * _FILE_STRIDE + number + 1}")
                 continue
             define = _DEFINE.match(line)
             if define:

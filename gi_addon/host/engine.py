@@ -23,6 +23,8 @@ from . import properties
 from .sync import SceneSync
 
 _POLL_SECONDS = 0.05
+# Told of every render's progress (0 … 1, text) and of its notes: the command line shows them.
+listeners: list = []
 
 
 @dataclass
@@ -132,6 +134,8 @@ class QuartetEngine(bpy.types.RenderEngine):
         while True:
             done, _ = concurrent.futures.wait([future], timeout=_POLL_SECONDS)
             self.update_progress(state["progress"])
+            for listener in listeners:
+                listener(state["progress"], state["text"])
             if state["text"]:
                 self.update_stats("", f"Quartet: {state['text']}")
             if done:

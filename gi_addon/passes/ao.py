@@ -35,8 +35,8 @@ class AOGeneration(Pass):
             program,
             ao_directions=facts.settings.ao.samples,
             ao_steps=facts.settings.ao.steps,
-            # Nothing of the scene is farther than its own diameter.
-            ao_distance=min(facts.ao_distance, 2.0 * facts.radius),
+            # Nothing of the scene is farther than its own diameter; and only the pass itself asks for that far.
+            ao_distance=min(facts.ao_distance, 2.0 * facts.radius) if "ao" in facts.layers else 0.0,
             ao_contact=facts.settings.ao.contact * facts.radius,
         )
         frame.screen(planned, program)

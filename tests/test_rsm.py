@@ -1,0 +1,224 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""RSM against closed forms, and the stability tests that are fast. f_s = 1: nothing here is fitted."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from conftest import make
+
+from gi_addon.compare import scenes
+
+
+def one_bounce(power: float, albedo: float, radius: float) -> float:
+    """E₁ = ρΦ/(4πR²): inside a diffuse sphere the first bounce lights every point alike, wherever the lamp is."""
+    return albedo * power / (4 * np.pi * radius**2)
+
+
+@pytest.mark.parametrize("lamp", [(0, 0, 0), (0.5, 0.0, 0.2), (0.0, 0.8, 0.0)])
+@pytest.mark.parametrize("samples", [1, 16])
+def test_sphere_one_bounce_matches_closed_form(gl, lamp, samples):
+    """Stability test 1: |g − 1| ≤ .02. The kernel is constant in a sphere, so this sees every factor and no singularity."""
+    scene = scenes.integrating_sphere(albedo=0.5, power=100.0, light=lamp)
+    image = make(scene, "Diffuse Indirect", samples=samples).passes["Diffuse Indirect"][..., 0] * np.pi
+    g = image / one_bounce(100.0, 0.5, 1.0)
+    assert abs(g.mean() - 1.0) <= 0.02
+    assert g.std() <= 0.03
+
+
+def rectangle_form_factor(half: float, distance: float) -> float:
+    """From a differential area to a parallel square centred above it (J. Howell, catalogue B-4, four quadrants)."""
+    a = half / distance
+    q = a / np.sqrt(1 + a * a)
+    return 4.0 / (2.0 * np.pi) * 2.0 * q * np.arctan(a / np.sqrt(1 + a * a))
+
+
+@pytest.mark.parametrize(("distance", "size"), [(1.0, 0.5), (0.5, 1.0), (2.0, 1.0)])
+def test_two_patches_match_their_form_factor(gl, distance, size):
+    """E = B F with B = ρ E_sun cosθ, to 1 %."""
+    albedo, scene = 0.6, scenes.two_patches(distance=distance, size=size, albedo=0.6)
+    image = make(scene, "Diffuse Indirect", "Depth", samples=16, rsm__samples=256, rsm__gather_scale=1,
+                 use_ao=False).passes  # fmt: skip
+    seen = image["Depth"][..., 0] < 1e9
+    direction = np.array([0.0, 0.9, -1.0])
+    cos = 1.0 / np.linalg.norm(direction)
+    expected = albedo * 10.0 * cos * rectangle_form_factor(size / 2, distance) / np.pi
+    assert seen.sum() > 20
+    assert image["Diffuse Indirect"][seen].mean() == pytest.approx(expected, rel=0.01)
+
+
+def test_a_flat_plane_never_lights_itself(gl):
+    scene = scenes.plane_scene(scenes.point_light((0, 0, 1), 100.0))
+    assert make(scene, "Diffuse Indirect", samples=4).passes["Diffuse Indirect"].max() == 0.0
+
+
+def test_energy_does_not_depend_on_map_or_sample_count(gl):
+    scene = scenes.cornell(blocks=False)
+    means = [
+        make(scene, "Diffuse Indirect", samples=8, rsm__resolution=r, rsm__samples=n).passes["Diffuse Indirect"].mean()
+        for r, n in ((64, 200), (256, 200), (512, 50), (512, 400))
+    ]
+    assert max(means) / min(means) < 1.03
+
+
+def test_interpolation_changes_little(gl):
+    """The low-resolution gather keeps the mean within 1 %, and each pixel within 5 % in the mean."""
+    scene = scenes.cornell()
+    full, low = (
+        make(scene, "Diffuse Indirect", samples=8, resolution=(192, 108), rsm__gather_scale=s).passes["Diffuse Indirect"]
+        for s in (1, 4)
+    )
+    assert low.mean() == pytest.approx(full.mean(), rel=0.01)
+    assert np.abs(low - full).mean() / full.mean() < 0.05
+
+
+def test_light_is_linear_in_power(gl):
+    """Stability test 17: power × k scales every light pass by k, 1e-3."""
+    a = make(scenes.cornell(power=60.0), "Combined", "Diffuse Direct", "Diffuse Indirect", samples=2).passes
+    b = make(scenes.cornell(power=60e3), "Combined", "Diffuse Direct", "Diffuse Indirect", samples=2).passes
+    for name in a:
+        x, y = a[name][..., :3] * 1e3, b[name][..., :3]
+        assert np.abs(x - y).max() <= 1e-3 * y.max(), name
+
+
+def test_two_lights_are_the_sum_of_each(gl):
+    """Stability test 17. Each light alone draws other samples than both together: equal up to their noise, and the
+    direct pass exactly."""
+    def box(*lights):
+        scene = scenes.cornell(blocks=False)
+        scene.lights = list(lights)
+        return make(scene, "Diffuse Direct", "Diffuse Indirect", samples=16).passes
+
+    one, two = scenes.point_light((-0.4, 0, 1.5), 40.0), scenes.spot_light((0.3, 0, 1.9), (0, 0, 0), 90.0, 1.4, 0.3)
+    both, a, b = box(one, two), box(one), box(two)
+    total = a["Diffuse Direct"] + b["Diffuse Direct"]
+    assert np.abs(both["Diffuse Direct"] - total).max() <= 1e-3 * total.max()
+    indirect = a["Diffuse Indirect"] + b["Diffuse Indirect"]
+    assert both["Diffuse Indirect"].mean() == pytest.approx(indirect.mean(), rel=0.01)
+
+
+def test_the_same_input_gives_the_same_picture_bit_for_bit(gl):
+    """Stability test 16."""
+    scene = scenes.cornell(light="area")
+    a, b = (make(scene, "Combined", samples=3).passes["Combined"] for _ in range(2))
+    assert np.array_equal(a, b)
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1e3])
+def test_a_scene_in_millimetres_or_kilometres_looks_alike(gl, scale):
+    """Stability test 12: lengths × s and power × s² leave radiance alone; relMSE ≤ 1e-4."""
+    def box(s):
+        scene = scenes.cornell(power=60.0 * s * s)
+        matrix = np.diag([s, s, s, 1.0])
+        scene.instances.matrix = matrix @ scene.instances.matrix
+        for light in scene.lights:
+            light.matrix = light.matrix.copy()
+            light.matrix[:3, 3] *= s
+        camera = scene.camera
+        camera.world_from_view[:3, 3] *= s
+        near, far = camera.clip_start * s, camera.clip_end * s
+        camera.clip_from_view[2] = [0, 0, -(far + near) / (far - near), -2 * far * near / (far - near)]
+        camera.clip_start, camera.clip_end = near, far
+        scene.world.ao_distance *= s
+        return make(scene, "Combined", samples=4).passes["Combined"][..., :3]
+
+    one, other = box(1.0), box(scale)
+    epsilon = 0.1 * one.mean()
+    assert np.mean((other - one) ** 2 / (one**2 + epsilon**2)) <= 1e-4
+
+
+def test_combined_is_the_sum_of_the_passes(gl):
+    """To 1e-4, with glossy and emissive materials and a world in it."""
+    b = scenes.SceneBuilder()
+    b.quads(scenes.box_quads((-1, -1, 0), (1, 1, 2), inward=True)[[0, 1, 3, 4, 5]], scenes.diffuse(scenes.WHITE))
+    b.quads(scenes.box_quads((-0.3, -0.3, 0), (0.3, 0.3, 0.6)), scenes.principled(Metallic=0.3, Roughness=0.4))
+    b.quads(scenes.box_quads((0.5, 0.2, 0.2), (0.7, 0.4, 0.4)), scenes.emissive((1, 0.5, 0.2), 4.0))
+    b.light(scenes.spot_light((0, 0, 1.95), (0, 0, 0), 60.0, 1.5))
+    scene = b.build(scenes.perspective((0, -4, 1), (0, 0, 1), 0.8), scenes.world((0.1, 0.2, 0.3)))
+    p = make(scene, "Combined", "Diffuse Direct", "Diffuse Indirect", "Diffuse Color", "Glossy Direct",
+             "Glossy Indirect", "Glossy Color", "Emission", "Environment", samples=8).passes  # fmt: skip
+    total = (p["Diffuse Direct"] + p["Diffuse Indirect"]) * p["Diffuse Color"]
+    total += (p["Glossy Direct"] + p["Glossy Indirect"]) * p["Glossy Color"] + p["Emission"] + p["Environment"]
+    combined = p["Combined"][..., :3]
+    assert np.abs(combined - total).max() <= 1e-4 * max(1.0, combined.max())
+    assert combined.mean() > 0.05
+
+
+def test_a_flat_receiver_shows_no_bands_and_sets_agree(gl):
+    """Stability test 10: std(T − blur T)/mean T ≤ 1 %; the mean over 16 sets varies by ≤ 2 %."""
+    b = scenes.SceneBuilder()
+    b.quads(np.array([[[-2, -2, 0], [2, -2, 0], [2, 2, 0], [-2, 2, 0]]]), scenes.diffuse((0.8,) * 3))
+    b.quads(np.array([[[-2, 2, 0], [2, 2, 0], [2, 2, 3], [-2, 2, 3]]])[:, ::-1], scenes.diffuse((0.8,) * 3))
+    b.light(scenes.sun_light((0.0, 1.0, -0.35), 5.0))
+    scene = b.build(scenes.perspective((0, 0.0, 3.0), (0, -0.4, 0), 0.45))
+    image = make(scene, "Diffuse Indirect", samples=16, rsm__gather_scale=1, use_ao=False).passes["Diffuse Indirect"][..., 0]
+    kernel = np.ones(7) / 7
+    blurred = np.apply_along_axis(lambda r: np.convolve(r, kernel, "valid"), 1, image)
+    blurred = np.apply_along_axis(lambda c: np.convolve(c, kernel, "valid"), 0, blurred)
+    inner = image[3:-3, 3:-3]
+    assert np.std(inner - blurred) / inner.mean() <= 0.01
+    sets = [
+        make(scene, "Diffuse Indirect", samples=1, rsm__samples=200 + k, use_ao=False).passes["Diffuse Indirect"].mean()
+        for k in range(16)
+    ]
+    assert np.std(sets) / np.mean(sets) <= 0.02
+
+
+def test_a_corner_neither_sparkles_nor_loses_light(gl):
+    """Stability test 11, the singularity of near virtual lights: two walls at 90°, one lit. The unlit wall gets
+    E(z) = B F with the form factor of a strip against a wall, F = ½ (1 − z/√(z² + w²)) for an infinitely long strip of
+    width w (Hottel's crossed strings): max T ≤ 2 × its 99th percentile, and 1 − g ≤ 5 %."""
+    width, long = 1.0, 40.0
+    b = scenes.SceneBuilder()
+    b.quads(np.array([[[-long, 0, 0], [long, 0, 0], [long, width, 0], [-long, width, 0]]]), scenes.diffuse((0.8,) * 3))
+    b.quads(np.array([[[-long, 0, 0], [-long, 0, width], [long, 0, width], [long, 0, 0]]]), scenes.diffuse((0.8,) * 3))
+    b.light(scenes.sun_light((0.0, 0.0, -1.0), 5.0))  # along the wall: only the strip is lit
+    scene = b.build(scenes.orthographic((0, 1.5, 0.5), (0, 0, 0.5), 1.0, aspect=16 / 9))
+    p = make(scene, "Diffuse Indirect", "Depth", "Diffuse Direct", samples=32, rsm__resolution=1024, use_ao=False).passes
+    image = p["Diffuse Indirect"][..., 0]
+    rows = image.shape[0]
+    z = 0.5 + ((np.arange(rows) + 0.5) / rows - 0.5) / (16 / 9)
+    expected = 0.8 * 5.0 * 0.5 * (1 - z / np.hypot(z, width)) / np.pi
+    assert p["Diffuse Direct"].max() == 0.0
+    reference = np.repeat(expected[:, None], image.shape[1], 1)
+    assert image.max() <= 2.0 * np.percentile(reference, 99)
+    assert 1.0 - image.mean() / reference.mean() <= 0.05
+    assert image.mean() / reference.mean() <= 1.05
+
+
+@pytest.mark.parametrize("outputs", [("Diffuse Indirect", "Ambient Occlusion")])
+def test_the_picture_keeps_its_light_at_any_size(gl, outputs):
+    """Stability test 13 for the screen: drift of the mean ≤ 3 % from ½ to 2 ×."""
+    scene = scenes.cornell()
+    means = [
+        make(scene, "Diffuse Indirect", samples=8, resolution=size).passes["Diffuse Indirect"].mean()
+        for size in ((48, 27), (96, 54), (192, 108))
+    ]
+    assert max(means) / min(means) <= 1.03
+
+
+def test_every_pass_is_finite_whatever_the_scene(gl):
+    """Stability test 18: background, empty scene, degenerate triangles, zero normals, zero scale, NaN vertices."""
+    from gi_addon.outputs import OUTPUTS
+
+    def check(scene, **settings):
+        for name, image in make(scene, *OUTPUTS, samples=2, resolution=(32, 18), **settings).passes.items():
+            assert np.isfinite(image).all(), name
+
+    camera = scenes.perspective((0, -4, 1), (0, 0, 1), 0.8)
+    check(scenes.SceneBuilder().build(camera))
+    check(scenes.SceneBuilder().build(camera, scenes.world((1, 1, 1))))
+    mesh = scenes.mesh_from_quads(scenes.box_quads((-0.5, -0.5, 0), (0.5, 0.5, 1)))
+    mesh.normals = np.zeros_like(mesh.normals)
+    flat = scenes.mesh_from_quads(np.zeros((1, 4, 3)))
+    broken = scenes.mesh_from_quads(scenes.box_quads((-0.2, -0.2, 1.2), (0.2, 0.2, 1.5)))
+    broken.positions[3] = np.nan
+    broken.__post_init__()
+    b = scenes.SceneBuilder()
+    for part in (mesh, flat, broken):
+        b.add(part, scenes.principled(Metallic=0.5, Roughness=0.0))
+    b.add(mesh, scenes.diffuse((1, 1, 1)), np.zeros((4, 4)))
+    b.light(scenes.point_light((0.5, -0.5, 0.5), 10.0))  # on the box's edge
+    b.light(scenes.sun_light((0, 0, -1), 1.0))
+    b.light(scenes.area_light((0, 0, 2), (0, 0, 0), 10.0, (0.0, 0.0)))
+    check(b.build(camera, scenes.world((0.2, 0.2, 0.2))))
