@@ -252,7 +252,7 @@ def view_uniforms(
     view_from_world = np.linalg.inv(world_from_view)
     rotation, eye = world_from_view[:3, :3], world_from_view[:3, 3]
     # Rays by unprojecting the four corners: exact for any projection.
-    inverse = np.linalg.inv((crop @ np.asarray(camera.clip_from_view, "f8")))
+    inverse = np.linalg.inv(crop @ np.asarray(camera.clip_from_view, "f8"))
 
     def unproject(u: float, v: float, z: float) -> np.ndarray:
         p = inverse @ np.array([2.0 * u - 1.0, 2.0 * v - 1.0, z, 1.0])

@@ -13,8 +13,8 @@ import moderngl
 import numpy as np
 
 from .gl import GL
-from .graph import Planned
 from .gpu_types import GENERATED
+from .graph import Planned
 from .materials import CompiledGraph, compile_surface, compile_world
 from .scene import Image, Material, Mesh, Scene, ShaderGraph
 
@@ -26,7 +26,10 @@ _INSTANCE = np.dtype([
 _INSTANCE_FORMAT = "3f 3f 3f 3f 3f 3f 4f 2f/i"
 _INSTANCE_NAMES = tuple(f"instance_{name}" for name in _INSTANCE.names)
 
-_PARAMS_BINDING = 7
+# Uniform block of a graph's parameters. Not a storage buffer: software drivers read zeros from those in the helper
+# pixels at a triangle's edge, and then texture coordinates have wrong derivatives there.
+_PARAMS_BINDING = 1
+_PARAMS_ALIGNMENT = 256  # bytes, the strictest GL_UNIFORM_BUFFER_OFFSET_ALIGNMENT that drivers ask for
 _MAX_ATTRIBUTES = 4
 # Meshes above this many triangles are drawn in spatial chunks, so that a view skips those it can't see. A mesh that is
 # placed many times is not: its copies are skipped one by one already.
@@ -64,9 +67,9 @@ class MaterialSet:
     def __init__(self) -> None:
         self._cache: dict[int, CompiledGraph] = {}
 
-    def compile(self, materials: list[Material]) -> list[CompiledGraph]:
+    def compile(self, materials: list[Material], images: list[Image]) -> list[CompiledGraph]:
         """Compile what is new, forget what is gone."""
-        self._cache = {m.uid: self._cache.get(m.uid) or compile_surface(m.graph) for m in materials}
+        self._cache = {m.uid: self._cache.get(m.uid) or compile_surface(m.graph, images) for m in materials}
         return [self._cache[m.uid] for m in materials]
 
 
@@ -100,16 +103,16 @@ class GPUScene:
         self.uploads = {}
         material_key = (stamps["materials"],)
         if material_key != self._material_key:
-            self.compiled = self.materials.compile(scene.materials)
+            self.compiled = self.materials.compile(scene.materials, scene.images)
             self._upload_params()
             self._material_key = material_key
             self._vaos.clear()
             self._drop_draws()
             self.uploads["materials"] = len(self.compiled)
         if self._world_key != scene.world.uid:
-            self.world = compile_world(scene.world.graph)
+            self.world = compile_world(scene.world.graph, scene.images)
             self._world_key = scene.world.uid
-            self._buffer("world_params", np.array(self.world.params or [0.0], "f4"))
+            self._buffer("world_params", np.frombuffer(_param_block(self.world), "u1"))
         self._sync_textures(scene)
         wanted = sorted({name for c in self.compiled for name in c.attributes[:_MAX_ATTRIBUTES]})
         mesh_key = (stamps["meshes"], tuple(wanted))
@@ -138,12 +141,13 @@ class GPUScene:
         return self._buffers[name]
 
     def _upload_params(self) -> None:
-        self._bases: list[int] = []
-        values: list[float] = []
+        self._param_ranges: list[tuple[int, int]] = []
+        data = b""
         for compiled in self.compiled:
-            self._bases.append(len(values))
-            values += compiled.params
-        self._buffer("params", np.array(values or [0.0], "f4"))
+            block = _param_block(compiled)
+            self._param_ranges.append((len(data), len(block)))
+            data += block + b"\0" * (-len(block) % _PARAMS_ALIGNMENT)
+        self._buffer("params", np.frombuffer(data or b"\0" * 16, "u1"))
 
     def _upload_meshes(self, scene: Scene, wanted: list[str]) -> None:
         meshes = scene.meshes
@@ -234,7 +238,7 @@ class GPUScene:
             pixels = np.ascontiguousarray(pixels[::step, ::step])
             height, width = pixels.shape[:2]
         if pixels.dtype == np.uint8:
-            fmt = "srgb8_a8" if image.colorspace == "srgb" else "rgba8"
+            fmt = "rgba8"
         else:
             finite = np.nan_to_num(pixels, nan=0.0, posinf=65504.0, neginf=0.0)
             pixels = np.clip(finite, -65504.0, 65504.0).astype("f2")
@@ -259,7 +263,7 @@ class GPUScene:
             if count:
                 program["clip_from_world"].write(clip_from_world)
                 if material >= 0:
-                    self._bind_material(program, self.compiled[material], self._bases[material], options["units"])
+                    self._bind_material(material, options["units"])
                 vao.render_indirect(draws.buffer, moderngl.TRIANGLES, int(count), first)
                 first += int(count)
         self.unbind_images(options["units"], max((len(c.images) for c in self.compiled), default=0))
@@ -375,14 +379,10 @@ class GPUScene:
             self._vaos[key] = self.gl.ctx.vertex_array(program, content, self._buffers["indices"])
         return key, self._vaos[key]
 
-    def bind_params(self) -> None:
-        """Bind the material parameters for the draws that follow."""
-        self._buffers["params"].bind_to_storage_buffer(_PARAMS_BINDING)
-
-    def _bind_material(self, program, compiled: CompiledGraph, base: int, units: int) -> None:
-        if "material_base" in program:
-            program["material_base"].value = base
-        self.bind_images(compiled, units)
+    def _bind_material(self, material: int, units: int) -> None:
+        offset, size = self._param_ranges[material]
+        self._buffers["params"].bind_to_uniform_block(_PARAMS_BINDING, offset=offset, size=size)
+        self.bind_images(self.compiled[material], units)
 
     def bind_images(self, compiled: CompiledGraph, units: int) -> None:
         """Bind a graph's images from texture unit ``units`` on."""
@@ -399,8 +399,8 @@ class GPUScene:
             self.gl.ctx.clear_samplers(units, units + count)
 
     def bind_world_params(self) -> None:
-        """Bind the world's parameters in place of the materials'."""
-        self._buffers["world_params"].bind_to_storage_buffer(_PARAMS_BINDING)
+        """Bind the world's parameters in place of a material's."""
+        self._buffers["world_params"].bind_to_uniform_block(_PARAMS_BINDING)
 
     def _sampler(self, interpolation: str, extension: str) -> moderngl.Sampler:
         key = (interpolation == "Closest", extension)
@@ -458,10 +458,7 @@ def _morton(points: np.ndarray, bounds: np.ndarray) -> np.ndarray:
 
 def material_source(compiled: CompiledGraph, units: int) -> str:
     """``generated/material.glsl`` of a surface: its images, parameters, attributes and function."""
-    lines = ["#define SURFACE_IMPLICIT_LOD 1"]
-    lines.append(f"layout(std430, binding = {_PARAMS_BINDING}) readonly buffer material_block {{ float material_params[]; }};")
-    lines.append("uniform int material_base;")
-    lines.append("float material_param(int i) { return material_params[material_base + i]; }")
+    lines = ["#define SURFACE_IMPLICIT_LOD 1", *_param_lines(compiled)]
     lines += _image_lines(compiled, units)
     for slot in range(len(compiled.attributes)):
         if slot < _MAX_ATTRIBUTES:
@@ -476,13 +473,25 @@ def material_source(compiled: CompiledGraph, units: int) -> str:
 
 def world_source(compiled: CompiledGraph, units: int) -> str:
     """``generated/world.glsl``: ``vec3 world_radiance(vec3 direction_ws)``."""
-    lines = ["#define SURFACE_IMPLICIT_LOD 0"]  # worlds are evaluated in compute shaders
-    lines.append(f"layout(std430, binding = {_PARAMS_BINDING}) readonly buffer world_block {{ float world_params[]; }};")
-    lines.append("float material_param(int i) { return world_params[i]; }")
+    lines = ["#define SURFACE_IMPLICIT_LOD 0", *_param_lines(compiled)]  # worlds are evaluated in compute shaders
     lines += _image_lines(compiled, units)
     lines += ['#include "lib/surface_lib.glsl"', '#include "nodes/math.glsl"', '#include "nodes/color.glsl"',
               '#include "nodes/texture.glsl"', compiled.glsl]  # fmt: skip
     return "\n".join(lines)
+
+
+def _param_block(compiled: CompiledGraph) -> bytes:
+    """A graph's parameters as the contents of its uniform block: whole vec4s, at least one."""
+    values = np.array(compiled.params, "f4")
+    return np.concatenate([values, np.zeros(-len(values) % 4 if len(values) else 4, "f4")]).tobytes()
+
+
+def _param_lines(compiled: CompiledGraph) -> list[str]:
+    count = max(1, -(-len(compiled.params) // 4))
+    return [
+        f"layout(std140, binding = {_PARAMS_BINDING}) uniform material_block {{ vec4 material_params[{count}]; }};",
+        "float material_param(int i) { return material_params[i >> 2][i & 3]; }",
+    ]
 
 
 def _image_lines(compiled: CompiledGraph, units: int) -> list[str]:

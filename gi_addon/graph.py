@@ -116,7 +116,8 @@ class Pass:
     """One box of a technique's pipeline.
 
     ``rate`` is ``static`` (run only when stale: a stamp in ``depends``, a setting in ``settings`` or a static input has
-    changed) or ``subframe`` (every time; ``Planned.stale`` then tells what of it is still good). ``shaders`` maps a key to stages (see ``GL.program``). ``figure`` names the paper's box.
+    changed) or ``subframe`` (every time; ``Planned.stale`` then tells what of it is still good). ``shaders`` maps a key to
+    stages (see ``GL.program``). ``figure`` names the paper's box.
     """
 
     title: ClassVar[str] = ""

@@ -324,7 +324,7 @@ def inspect(
 ) -> Plan:
     """The plan of a frame without rendering it, and without a GPU: worlds that are not one colour count as lit."""
     settings = settings or Settings()
-    compiled = [compile_surface(m.graph) for m in scene.materials]
+    compiled = [compile_surface(m.graph, scene.images) for m in scene.materials]
     world = compile_world(scene.world.graph)
     black = world.constant is not None and not any(world.constant)
     world_map = None if black else WorldMap(np.ones((16, 32, 3)))

@@ -15,6 +15,7 @@ import itertools
 import json
 import zipfile
 from dataclasses import dataclass, field, fields, is_dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -77,6 +78,17 @@ class Image:
     colorspace: str = "srgb"
     missing: bool = False
     uid: int = field(default_factory=lambda: next(_uids))
+
+    @property
+    def encoded(self) -> bool:
+        """Whether the pixels are sRGB bytes to be decoded after filtering, as Cycles does."""
+        return self.colorspace == "srgb" and self.pixels.dtype == np.uint8
+
+    @cached_property
+    def opaque(self) -> bool:
+        """Whether alpha is 1 everywhere."""
+        alpha = self.pixels[..., 3]
+        return bool((alpha == (255 if alpha.dtype == np.uint8 else 1.0)).all())
 
     @staticmethod
     def placeholder(name: str) -> Image:
@@ -410,6 +422,25 @@ _TYPES.update({
 })  # fmt: skip
 
 __all__ = [
-    "ALL_RAYS", "CAMERA", "Camera", "DIFFUSE", "GLOSSY", "HOLDOUT", "Image", "Instances", "Light", "Link", "Material",
-    "Mesh", "Node", "SHADOW", "Scene", "ShaderGraph", "SnapshotError", "TRANSMISSION", "VOLUME", "World", "replace",
+    "ALL_RAYS",
+    "CAMERA",
+    "DIFFUSE",
+    "GLOSSY",
+    "HOLDOUT",
+    "SHADOW",
+    "TRANSMISSION",
+    "VOLUME",
+    "Camera",
+    "Image",
+    "Instances",
+    "Light",
+    "Link",
+    "Material",
+    "Mesh",
+    "Node",
+    "Scene",
+    "ShaderGraph",
+    "SnapshotError",
+    "World",
+    "replace",
 ]  # fmt: skip

@@ -239,7 +239,7 @@ def convert(path: str, value: Any, default: Any, meta: Meta) -> Any:
         raise SettingError(f"{path}: {value!r} is not a{_kind(default)}") from None
     if meta.choices and value not in [c[0] for c in meta.choices]:
         raise SettingError(f"{path}: {value!r} is none of {', '.join(c[0] for c in meta.choices)}")
-    if meta.low is not None and value < meta.low or meta.high is not None and value > meta.high:
+    if (meta.low is not None and value < meta.low) or (meta.high is not None and value > meta.high):
         raise SettingError(f"{path}: {value} is outside {meta.low} … {meta.high}")
     return value
 

@@ -101,7 +101,9 @@ def test_the_brdf_is_reciprocal(gl):
 def test_dielectric_fresnel_has_its_known_values(gl):
     """Normal incidence ((n−1)/(n+1))², grazing 1, Brewster's angle half of the s-polarised reflectance, and total
     reflection from inside beyond asin(1/n)."""
-    code = "vec4 evaluate(vec4 v) { return vec4(fresnel_dielectric(v.x, v.y), f0_from_ior(v.y), ior_from_f0(f0_from_ior(v.y)), 0.0); }"
+    code = """vec4 evaluate(vec4 v) {
+        return vec4(fresnel_dielectric(v.x, v.y), f0_from_ior(v.y), ior_from_f0(f0_from_ior(v.y)), 0.0);
+    }"""
     n = 1.5
     brewster = np.cos(np.arctan(n))
     out = gl(evaluate, code, np.array([[1, n, 0, 0], [0, n, 0, 0], [brewster, n, 0, 0], [0.5, 1 / n, 0, 0]]), BSDF)

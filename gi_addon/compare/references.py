@@ -59,7 +59,7 @@ def reference(
     passes = tuple(passes)
     folder = (folder or cache_folder()) / "references"
     halves = []
-    for half, seed in SEEDS.items():
+    for _half, seed in SEEDS.items():
         text = repr((_FORMAT, scene_key, resolution, samples, BOUNCES[kind], seed, sorted(passes)))
         path = folder / f"{hashlib.blake2b(text.encode(), digest_size=16).hexdigest()}.exr"
         data = _read(path, passes)
@@ -78,7 +78,7 @@ def _read(path: Path, passes: tuple[str, ...]) -> dict[str, np.ndarray] | None:
         return None
     try:
         data = exr.read(path)
-    except Exception:  # noqa: BLE001 - whatever is wrong with a cached file, it is made anew
+    except Exception:
         path.unlink(missing_ok=True)
         return None
     return data if all(name in data for name in passes) else None

@@ -11,7 +11,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..scene import (
-    CAMERA,
     Camera,
     Instances,
     Light,
@@ -252,7 +251,7 @@ def cornell(*, blocks: bool = True, light: str = "spot", power: float = 60.0, as
         "area": lambda: area_light((0, 0, 1.99), (0, 0, 0), power, (0.5, 0.5)),
         "sun": lambda: sun_light((0.25, 0.8, -0.9), power / 10.0),
     }[light]())  # fmt: skip
-    return b.build(perspective((0, -4.2, 1.0), (0, 0, 1.0), 0.85, aspect))
+    return b.build(perspective((0, -4.2, 1.0), (0, 0, 1.0), 1.15, aspect))
 
 
 def integrating_sphere(

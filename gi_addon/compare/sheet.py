@@ -44,8 +44,8 @@ def comparison(path: str | Path, rows: Sequence[tuple[str, np.ndarray, np.ndarra
         top = i * (height + _LABEL_HEIGHT)
         scale = exposure(reference)
         pictures = (test, reference, 4.0 * np.abs(test - reference))
-        for k, (picture, title) in enumerate(zip(pictures, (*titles, "difference × 4"), strict=True)):
+        for k, (picture, title) in enumerate(zip(pictures, (*titles, "difference x 4"), strict=True)):
             x = k * (width + 2)
-            draw.text((x + 3, top + 2), f"{label} — {title}", fill=(220, 220, 220))
+            draw.text((x + 3, top + 2), f"{label}: {title}", fill=(220, 220, 220))
             sheet.paste(Image.fromarray(srgb(picture[::-1, :, :3] * scale)), (x, top + _LABEL_HEIGHT))
     sheet.save(path)

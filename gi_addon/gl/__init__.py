@@ -7,6 +7,20 @@ from .structs import glsl_struct, struct
 from .thread import CancelToken, GLThread, driver, shared, shutdown
 
 __all__ = [
-    "GL", "MIB", "Cancelled", "CancelToken", "GLContextLost", "GLError", "GLOutOfMemory", "GLThread", "GLTooOld",
-    "GLUnavailable", "ShaderError", "driver", "glsl_struct", "shared", "shutdown", "struct",
+    "GL",
+    "MIB",
+    "CancelToken",
+    "Cancelled",
+    "GLContextLost",
+    "GLError",
+    "GLOutOfMemory",
+    "GLThread",
+    "GLTooOld",
+    "GLUnavailable",
+    "ShaderError",
+    "driver",
+    "glsl_struct",
+    "shared",
+    "shutdown",
+    "struct",
 ]  # fmt: skip

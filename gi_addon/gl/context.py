@@ -100,7 +100,7 @@ class GL:
             elif len(size) == 3:
                 texture = self.ctx.texture3d(size, f.components, data, dtype=f.dtype)
             else:
-                texture = self.ctx.texture(size, f.components, data, dtype=f.dtype, internal_format=f.internal)
+                texture = self.ctx.texture(size, f.components, data, dtype=f.dtype)
         except Exception as error:
             raise self._allocation_error(label, nbytes, error) from error
         self._check_allocation(label, nbytes)

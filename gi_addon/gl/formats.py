@@ -20,7 +20,6 @@ class Format:
     bytes: int
     glsl: str = ""
     image: str | None = None
-    internal: int | None = None
 
     @property
     def value_type(self) -> str:
@@ -30,15 +29,12 @@ class Format:
         return f"{self.glsl}vec{self.components}"
 
 
-_GL_SRGB8_ALPHA8 = 0x8C43
-
 FORMATS: dict[str, Format] = {
     f.name: f
     for f in (
         Format("r8", 1, "f1", 1, image="r8"),
         Format("rg8", 2, "f1", 2, image="rg8"),
         Format("rgba8", 4, "f1", 4, image="rgba8"),
-        Format("srgb8_a8", 4, "f1", 4, internal=_GL_SRGB8_ALPHA8),
         Format("rg16", 2, "nu2", 4, image="rg16"),
         Format("rgba16", 4, "nu2", 8, image="rgba16"),
         Format("r16f", 1, "f2", 2, image="r16f"),

@@ -94,7 +94,7 @@ class GLThread:
                 if cancel is not None:
                     cancel.check()
                 future.set_result(job(self._context(), *args, **kwargs))
-            except BaseException as error:  # noqa: BLE001 - every failure belongs to the job's owner
+            except BaseException as error:
                 if isinstance(error, GLContextLost):
                     self._drop()
                 future.set_exception(error)
@@ -137,4 +137,4 @@ def shutdown() -> None:
     _shared.close()
 
 
-__all__ = ["Cancelled", "CancelToken", "GLError", "GLThread", "driver", "shared", "shutdown"]
+__all__ = ["CancelToken", "Cancelled", "GLError", "GLThread", "driver", "shared", "shutdown"]

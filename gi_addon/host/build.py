@@ -35,9 +35,8 @@ def build(source: Scene, *, clear: bool = True) -> bpy.types.Scene:
     for i in range(len(inst)):
         data = meshes[inst.mesh[i]]
         used = inst.materials[i]
-        for slot, index in enumerate(used):
-            if slot >= len(data.materials):
-                data.materials.append(None)
+        while len(data.materials) < len(used):
+            data.materials.append(None)
         obj = bpy.data.objects.new(f"{data.name}.{i}", data)
         scene.collection.objects.link(obj)
         obj.matrix_world = Matrix(inst.matrix[i].tolist())

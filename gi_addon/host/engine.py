@@ -8,6 +8,7 @@ uses nothing of Blender's but the result and the progress bar. All OpenGL happen
 from __future__ import annotations
 
 import concurrent.futures
+import contextlib
 import traceback
 from dataclasses import dataclass
 
@@ -66,7 +67,7 @@ class QuartetEngine(bpy.types.RenderEngine):
             self._job = self._read(depsgraph)
         except (RenderError, SettingError) as error:
             self._failure = str(error)
-        except Exception as error:  # noqa: BLE001 - Blender would swallow it and save a black file
+        except Exception as error:
             traceback.print_exc()
             self._failure = f"the scene could not be read: {type(error).__name__}: {error}"
 
@@ -103,7 +104,7 @@ class QuartetEngine(bpy.types.RenderEngine):
             pass
         except (RenderError, GLError, SettingError) as error:
             self._fail(str(error))
-        except Exception as error:  # noqa: BLE001 - as above
+        except Exception as error:
             traceback.print_exc()
             self._fail(f"{type(error).__name__}: {error}")
         finally:
@@ -167,10 +168,8 @@ class QuartetEngine(bpy.types.RenderEngine):
         """Give GPU memory back."""
         renderer, self._renderer, self._sync = self._renderer, None, None
         if renderer is not None:
-            try:
+            with contextlib.suppress(GLError):  # the context is gone, and the memory with it
                 shared().call(lambda gl: renderer.close())
-            except GLError:
-                pass  # the context is gone, and the memory with it
 
     # -- passes --------------------------------------------------------------------------------------------------
 

@@ -9,10 +9,10 @@ An unknown node never breaks a material: it becomes the best constant, and ``app
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from ..scene import Link, Node, ShaderGraph
+from ..scene import Image, Link, Node, ShaderGraph
 
 FLOAT, VECTOR, COLOR, CLOSURE = "float", "vector", "color", "closure"
 _GLSL_TYPE = {FLOAT: "float", VECTOR: "vec3", COLOR: "vec3", CLOSURE: "Closure"}
@@ -62,8 +62,9 @@ class CompiledGraph:
 class Compiler:
     """State of one compilation. Node functions in ``nodes.py`` call it."""
 
-    def __init__(self, graph: ShaderGraph, *, world: bool = False) -> None:
+    def __init__(self, graph: ShaderGraph, images: Sequence[Image] = (), *, world: bool = False) -> None:
         self.graph = graph
+        self.images = images
         self.world = world
         self.lines: list[str] = []
         self.result = CompiledGraph("")
@@ -136,6 +137,13 @@ class Compiler:
         self.result.samplers.append((interpolation, extension))
         return f"material_image_{len(used)}"
 
+    def image_flags(self, index: int) -> tuple[bool, bool]:
+        """Whether image ``index`` holds encoded sRGB bytes, and whether its alpha is 1 everywhere."""
+        if index >= len(self.images):
+            return False, False
+        image = self.images[index]
+        return image.encoded, image.opaque
+
     def attribute(self, name: str) -> str:
         """The GLSL name (vec4) of mesh attribute ``name``: ``uv:LAYER``, ``color:LAYER`` (no layer: the active one) or
         ``attr:NAME``."""
@@ -177,18 +185,18 @@ class Compiler:
         return f"material_param({index})"
 
 
-def compile_surface(graph: ShaderGraph) -> CompiledGraph:
-    """Compile a material's surface to ``Closure surface_closure(SurfacePoint point)``."""
-    c = Compiler(graph)
+def compile_surface(graph: ShaderGraph, images: Sequence[Image] = ()) -> CompiledGraph:
+    """Compile a material's surface to ``Closure surface_closure(SurfacePoint point)``; ``images`` are the scene's."""
+    c = Compiler(graph, images)
     value = c.convert(c.output(graph.surface), CLOSURE) if graph.surface else Value(CLOSURE, "closure_none()")
     body = "\n".join(f"    {line}" for line in c.lines)
     c.result.glsl = f"Closure surface_closure(SurfacePoint point) {{\n{body}\n    return {value.text};\n}}\n"
     return c.result
 
 
-def compile_world(graph: ShaderGraph) -> CompiledGraph:
+def compile_world(graph: ShaderGraph, images: Sequence[Image] = ()) -> CompiledGraph:
     """Compile a world to ``vec3 world_radiance(vec3 direction_ws)``; ``constant`` is set if it is one colour."""
-    c = Compiler(graph, world=True)
+    c = Compiler(graph, images, world=True)
     if graph.surface is None:
         c.result.constant = (0.0, 0.0, 0.0)
         c.result.glsl = "vec3 world_radiance(vec3 direction_ws) { return vec3(0.0); }\n"

@@ -15,7 +15,8 @@ import numpy as np
 from ..scene import Image, Link, Node, ShaderGraph
 
 _GRAY = np.array([0.2126, 0.7152, 0.0722])
-_BINARY: dict[str, Callable] = {
+# Operations of the Math node on two numbers that are known before rendering.
+BINARY: dict[str, Callable] = {
     "ADD": operator.add, "SUBTRACT": operator.sub, "MULTIPLY": operator.mul, "MINIMUM": np.minimum,
     "MAXIMUM": np.maximum, "LESS_THAN": lambda a, b: float(a < b), "GREATER_THAN": lambda a, b: float(a > b),
     "DIVIDE": lambda a, b: a / b if b else 0.0, "POWER": lambda a, b: abs(a) ** b if a else 0.0,
@@ -71,9 +72,9 @@ class _Walk:
         if node.kind in ("RGB", "VALUE"):
             v = node.params.get("value", 0.5)
             return np.array(v[:3], "f8") if isinstance(v, tuple) else float(v)
-        if node.kind == "MATH" and node.params.get("operation") in _BINARY:
+        if node.kind == "MATH" and node.params.get("operation") in BINARY:
             a, b = self.number(get("Value", 0.5), depth), self.number(get("Value_001", 0.5), depth)
-            return float(_BINARY[node.params["operation"]](a, b))
+            return float(BINARY[node.params["operation"]](a, b))
         if node.kind == "MIX":
             suffix = {"RGBA": "Color", "VECTOR": "Vector"}.get(node.params.get("data_type"), "Float")
             return self._blend(node.params.get("blend_type", "MIX") if suffix == "Color" else "MIX",

@@ -11,6 +11,7 @@ from collections.abc import Callable
 
 from ..scene import Node
 from .compiler import CLOSURE, COLOR, FLOAT, VECTOR, Compiler, Value
+from .means import BINARY
 
 NODES: dict[str, Callable[[Compiler, Node], dict[str, Value]]] = {}
 
@@ -45,7 +46,7 @@ def fallback(c: Compiler, n: Node) -> dict[str, Value]:
     colors = [v for k, v in n.inputs.items() if k.startswith("Color") and isinstance(v, tuple)]
     mean = tuple(sum(v[i] for v in colors) / len(colors) for i in range(3)) if colors else (0.5, 0.5, 0.5)
     table = _FALLBACK.get(n.kind, {})
-    out = {"Color": c.constant(mean if "Color" not in table else table["Color"], COLOR)}
+    out = {"Color": c.constant(table.get("Color", mean), COLOR)}
     for name in ("Fac", "Value", "Distance", "Alpha", "AO", "Factor", "Result"):
         out[name] = c.constant(table.get(name, 1.0 if name == "Alpha" else 0.5), FLOAT)
     out["Vector"] = c.constant((0.0, 0.0, 0.0), VECTOR)
@@ -58,7 +59,7 @@ def fallback(c: Compiler, n: Node) -> dict[str, Value]:
 def _outputs(values: dict[str, Value]) -> dict[str, Value]:
     """A closure under every name a closure output goes by."""
     closure = next(iter(values.values()))
-    return {name: closure for name in ("BSDF", "BSSRDF", "Emission", "Background", "Shader")}
+    return dict.fromkeys(("BSDF", "BSSRDF", "Emission", "Background", "Shader"), closure)
 
 
 # --- closures ---------------------------------------------------------------------------------------------------------
@@ -386,20 +387,25 @@ def image_texture(c: Compiler, n: Node) -> dict[str, Value]:
     co = _coordinate(c, n, f"vec3({c.attribute('uv:')}.xy, 0.0)")
     sampler = c.image(index, n.params.get("interpolation", "Linear"), n.params.get("extension", "REPEAT"))
     projection = n.params.get("projection", "FLAT")
-    flags = f"{_alpha_mode(n)}, {('REPEAT', 'EXTEND', 'CLIP', 'MIRROR').index(n.params.get('extension', 'REPEAT'))}"
+    encoded, opaque = c.image_flags(index)
+    extension = ("REPEAT", "EXTEND", "CLIP", "MIRROR").index(n.params.get("extension", "REPEAT"))
+    flags = f"{int(encoded)}, {extension}"
+    projection = n.params.get("projection", "FLAT")
     if projection == "BOX":
         blend = c.constant(n.params.get("projection_blend", 0.0), FLOAT)
         text = f"node_image_box({sampler}, {co}, point.normal_os, {blend.text}, {flags})"
     else:
         co = {"SPHERE": f"node_map_to_sphere({co})", "TUBE": f"node_map_to_tube({co})"}.get(projection, f"({co}).xy")
         text = f"node_image({sampler}, {co}, {flags})"
+    return _texel(c, n, text, opaque and extension != 2)
+
+
+def _texel(c: Compiler, n: Node, text: str, opaque: bool) -> dict[str, Value]:
+    """Colour and alpha of an image look-up; an alpha that is 1 everywhere is known to be."""
     out = c.name()
     c.statement(f"vec4 {out} = {text};")
-    return {"Color": Value(COLOR, f"{out}.xyz"), "Alpha": Value(FLOAT, f"{out}.w")}
-
-
-def _alpha_mode(n: Node) -> int:
-    return {"STRAIGHT": 0, "PREMUL": 1, "CHANNEL_PACKED": 2, "NONE": 3}[n.params.get("alpha_mode", "STRAIGHT")]
+    known = opaque or n.params.get("alpha_mode") == "NONE"
+    return {"Color": Value(COLOR, f"{out}.xyz"), "Alpha": Value(FLOAT, "1.0", (1.0,)) if known else Value(FLOAT, f"{out}.w")}
 
 
 @node("TEX_ENVIRONMENT")
@@ -410,10 +416,8 @@ def environment_texture(c: Compiler, n: Node) -> dict[str, Value]:
     co = _coordinate(c, n, "point.position_ws")
     sampler = c.image(index, n.params.get("interpolation", "Linear"), "REPEAT")
     mapping = "node_direction_to_mirror_ball" if n.params.get("projection") == "MIRROR_BALL" else "node_equirect"
-    out = c.name()
-    flags = f"{_alpha_mode(n)}, 0"
-    c.statement(f"vec4 {out} = node_image({sampler}, {mapping}({co}), {flags});")
-    return {"Color": Value(COLOR, f"{out}.xyz"), "Alpha": Value(FLOAT, f"{out}.w")}
+    encoded, opaque = c.image_flags(index)
+    return _texel(c, n, f"node_image({sampler}, {mapping}({co}), {int(encoded)}, 0)", opaque)
 
 
 @node("TEX_CHECKER")
@@ -488,6 +492,10 @@ def math(c: Compiler, n: Node) -> dict[str, Value]:
     if operation not in _MATH:
         c.approximate(n, f"operation {operation} is not evaluated")
         return {"Value": a}
+    if operation in BINARY and a.constant is not None and b.constant is not None:
+        # Known now: what it switches (alpha, emission …) can then be left out.
+        known = float(BINARY[operation](a.constant[0], b.constant[0]))
+        return {"Value": c.constant(min(max(known, 0.0), 1.0) if n.params.get("use_clamp") else known, FLOAT)}
     text = _MATH[operation].format(a=f"({a.text})", b=f"({b.text})", c=f"({d.text})")
     return {"Value": c.variable(FLOAT, f"clamp({text}, 0.0, 1.0)" if n.params.get("use_clamp") else text)}
 
@@ -657,7 +665,7 @@ def clamp(c: Compiler, n: Node) -> dict[str, Value]:
 @node("MAP_RANGE")
 def map_range(c: Compiler, n: Node) -> dict[str, Value]:
     vector = n.params.get("data_type") == "FLOAT_VECTOR"
-    type, suffix = (VECTOR, "_FLOAT3") if vector else (FLOAT, "")
+    type, _suffix = (VECTOR, "_FLOAT3") if vector else (FLOAT, "")
     names = (("Vector", "From_Min_FLOAT3", "From_Max_FLOAT3", "To_Min_FLOAT3", "To_Max_FLOAT3", "Steps_FLOAT3") if vector
              else ("Value", "From Min", "From Max", "To Min", "To Max", "Steps"))  # fmt: skip
     defaults = (1.0, 0.0, 1.0, 0.0, 1.0, 4.0)

@@ -55,7 +55,6 @@ class GBuffer(Pass):
         fbo.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
         frame.gl.ctx.enable_only(moderngl.DEPTH_TEST)
         frame.bind(planned)
-        frame.gpu.bind_params()
         frame.gpu.draw(
             planned,
             {"vertex": "surface/surface_vert.glsl", "fragment": "passes/gbuffer_frag.glsl"},

@@ -133,13 +133,12 @@ def draw_light_maps(frame: Frame, planned: Planned, visibility: int, fragment: s
         fbo.clear(nothing, nothing, nothing, nothing, depth=1.0)
     ctx.enable_only(moderngl.DEPTH_TEST)
     frame.bind(planned)
-    frame.gpu.bind_params()
-    options = dict(
-        full=full, units=len(planned.texture_reads()), defines={
+    options = {
+        "full": full, "units": len(planned.texture_reads()), "defines": {
             "SURFACE_TABLES": 2 if planned.has("brdf.average") else 0, "SURFACE_SEE_THROUGH_GLASS": 1,
             "SURFACE_SEEN_BY_CAMERA": 0, "SURFACE_SEEN_BY_SHADOW": int(not full),
         },
-    )  # fmt: skip
+    }  # fmt: skip
     stages = {"vertex": _VERTEX, "fragment": fragment}
     programs = frame.gpu.programs(planned, stages, visibility, **options)
     for i in due:

@@ -1,7 +1,13 @@
 // Image and environment look-ups, and checker.
 
-// alpha_mode: 0 straight, 1 premultiplied, 2 channel packed, 3 none. extension: 0 repeat, 1 extend, 2 clip, 3 mirror.
-vec4 node_image(sampler2D image, vec2 uv, int alpha_mode, int extension)
+vec3 srgb_decode(vec3 c)
+{
+    return mix(pow((c + 0.055) / 1.055, vec3(2.4)), c / 12.92, vec3(lessThanEqual(c, vec3(0.04045))));
+}
+
+// encoded: the texels are sRGB bytes, decoded after they are filtered, as Cycles does.
+// extension: 0 repeat, 1 extend, 2 clip, 3 mirror.
+vec4 node_image(sampler2D image, vec2 uv, int encoded, int extension)
 {
     if (extension == 3) {
         vec2 f = fract(uv * 0.5) * 2.0;
@@ -12,16 +18,16 @@ vec4 node_image(sampler2D image, vec2 uv, int alpha_mode, int extension)
 #else
     vec4 c = textureLod(image, uv, 0.0);
 #endif
+    if (encoded != 0) {
+        c.rgb = srgb_decode(c.rgb);
+    }
     if (extension == 2 && (any(lessThan(uv, vec2(0.0))) || any(greaterThan(uv, vec2(1.0))))) {
         return vec4(0.0);
-    }
-    if (alpha_mode == 3) {
-        c.a = 1.0;
     }
     return c;
 }
 
-vec4 node_image_box(sampler2D image, vec3 co, vec3 n, float blend, int alpha_mode, int extension)
+vec4 node_image_box(sampler2D image, vec3 co, vec3 n, float blend, int encoded, int extension)
 {
     vec3 w = abs(n) / max(dot(abs(n), vec3(1.0)), 1e-6);
     // Weights of the three sides; `blend` widens the seam between them.
@@ -44,13 +50,13 @@ vec4 node_image_box(sampler2D image, vec3 co, vec3 n, float blend, int alpha_mod
     }
     vec4 c = vec4(0.0);
     if (weight.x > 0.0) {
-        c += weight.x * node_image(image, n.x < 0.0 ? vec2(1.0 - co.y, co.z) : co.yz, alpha_mode, extension);
+        c += weight.x * node_image(image, n.x < 0.0 ? vec2(1.0 - co.y, co.z) : co.yz, encoded, extension);
     }
     if (weight.y > 0.0) {
-        c += weight.y * node_image(image, n.y > 0.0 ? vec2(1.0 - co.x, co.z) : co.xz, alpha_mode, extension);
+        c += weight.y * node_image(image, n.y > 0.0 ? vec2(1.0 - co.x, co.z) : co.xz, encoded, extension);
     }
     if (weight.z > 0.0) {
-        c += weight.z * node_image(image, n.z > 0.0 ? vec2(1.0 - co.y, co.x) : co.yx, alpha_mode, extension);
+        c += weight.z * node_image(image, n.z > 0.0 ? vec2(1.0 - co.y, co.x) : co.yx, encoded, extension);
     }
     return c;
 }

@@ -10,12 +10,13 @@ void main()
 {
     float depth = view_depth(vary_position_ws);
     vec2 uv = gl_FragCoord.xy * view.inverse_resolution;
-    if (depth < view.clip_start || depth > view.clip_end) {
-        discard;
-    }
     SurfacePoint p = surface_point(view_direction_ws(uv));
     Closure c = surface_closure(p);
     float opacity = surface_opacity(c);
+    // After the look-ups: a neighbour that is gone has no texture coordinate to take derivatives from.
+    if (depth < view.clip_start || depth > view.clip_end) {
+        discard;
+    }
 #if SURFACE_TRANSPARENT
     if (!surface_is_there(opacity, 0u)) {
         discard;

@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Settings: one declaration, no dead knobs."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+import pytest
+from conftest import make
+
+from gi_addon.compare import scenes
+from gi_addon.settings import SettingError, Settings, markdown, walk
+
+# A value unlike the default for every setting, so that a new one without an entry fails here.
+OTHER = {
+    "technique": None, "use_indirect_diffuse": False, "use_glossy": None, "use_shadows": False, "use_ao": False,
+    "use_translucency": None, "use_volumetric": None, "use_area_lights": False, "samples": 3,
+    "viewport_samples": None, "bounces": 0, "pixel_filter": "BLACKMAN_HARRIS", "filter_width": 3.0,
+    "shadows.resolution": 64, "shadows.softness": 6.0, "ao.samples": 1, "ao.steps": 1, "ao.distance": 0.3,
+    "ao.contact": 0.5, "world.samples": 1, "world.resolution": 64, "rsm.resolution": 32, "rsm.samples": 7,
+    "rsm.gather_scale": 1,
+}  # fmt: skip
+# Not read by the picture itself: the viewport's own number of sub-frames; and effects whose techniques have yet to land.
+ELSEWHERE = {"viewport_samples", "technique", "use_glossy", "use_translucency", "use_volumetric"}
+
+
+@functools.cache
+def scene():
+    """Something of everything: sun, area light, world, occluders, gloss."""
+    s = scenes.cornell(light="area")
+    s.lights.append(scenes.sun_light((0.25, 0.8, -0.9), 3.0, 0.02))
+    s.materials[0] = scenes.principled(Base_Color=scenes.WHITE, Roughness=0.3)
+    s.world = scenes.world((0.3, 0.4, 0.5))
+    return s
+
+
+@functools.cache
+def default_picture():
+    return make(scene(), "Combined", "Ambient Occlusion", samples=2)
+
+
+@pytest.mark.parametrize("path", [p for p, _, _ in walk()])
+def test_every_setting_changes_the_picture_or_the_plan(gl, path):
+    if path in ELSEWHERE:
+        assert OTHER[path] is None
+        return
+    result = make(scene(), "Combined", "Ambient Occlusion", **{"samples": 2, path.replace(".", "__"): OTHER[path]})
+    base = default_picture()
+    changed = any(not np.array_equal(result.passes[n], base.passes[n]) for n in base.passes)
+    assert changed or result.plan.text() != base.plan.text()
+
+
+def test_values_are_checked_and_say_what_is_wrong():
+    s = Settings()
+    s.set("rsm.samples", "300")
+    s.set("use_ao", "off")
+    s.set("pixel_filter", "blackman_harris")
+    assert s.rsm.samples == 300 and s.use_ao is False and s.pixel_filter == "BLACKMAN_HARRIS"
+    for path, value, message in (
+        ("rsm.samples", "many", "whole number"), ("rsm.samples", 0, "outside"), ("rsm.sample", 3, "rsm.samples"),
+        ("technique", "RTX", "none of"), ("use_ao", "perhaps", "on/off"), ("rsm", 3, "no setting"),
+        ("filter_width", "nan", "number"), ("rsm.samples", 2.5, "whole number"),
+    ):  # fmt: skip
+        with pytest.raises(SettingError, match=message):
+            s.set(path, value)
+
+
+def test_a_copy_is_independent():
+    a = Settings()
+    b = a.copy()
+    b.rsm.samples = 7
+    assert a.rsm.samples != 7 and a.as_dict() != b.as_dict()
+
+
+def test_the_docs_list_every_setting():
+    text = markdown()
+    assert all(f"`{path}`" in text for path, _, _ in walk())
