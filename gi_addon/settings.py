@@ -78,7 +78,7 @@ class AOSettings:
         higher="less noise", lower="faster",
     )  # fmt: skip
     steps: int = _setting(
-        6, "Steps", "Depth-buffer tests along each direction; 1 is the paper's single point per direction",
+        12, "Steps", "Depth-buffer tests along each direction; 1 is the paper's single point per direction",
         low=1, high=32, higher="finds thin occluders", lower="faster",
     )  # fmt: skip
     distance: float = _setting(

@@ -76,3 +76,9 @@ def test_a_copy_is_independent():
 def test_the_docs_list_every_setting():
     text = markdown()
     assert all(f"`{path}`" in text for path, _, _ in walk())
+
+
+def test_the_committed_settings_page_is_current():
+    from conftest import ROOT
+
+    assert (ROOT / "docs" / "settings.md").read_text().endswith(markdown()), "run scripts/make_docs.py"

@@ -40,9 +40,9 @@ void main()
         vec3 direction = frame * vec3(radius * cos(phi), radius * sin(phi), sqrt(1.0 - u.x));
         float hit = dot(direction, ng) <= 0.0 ? 0.0 : -1.0;
         for (int k = 0; k < ao_steps && hit < 0.0; ++k) {
-            // Cubic spacing: as fine near the surface as contacts need.
+            // Quadratic spacing: finer near the surface, where contacts are.
             float t = (float(k) + jitter) / float(ao_steps);
-            float reach = reach_of_steps * t * t * t;
+            float reach = reach_of_steps * t * t;
             vec3 p = project_ws(start_ws + direction * reach);
             if (p.z <= view.clip_start || any(lessThan(p.xy, vec2(0.0))) || any(greaterThanEqual(p.xy, vec2(1.0)))) {
                 break; // the screen does not know
