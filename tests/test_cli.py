@@ -57,7 +57,7 @@ def test_other_formats_are_read_directly(quartet, blender, tmp_path, suffix):
         blender.ops.wm.obj_export(filepath=str(path))
     output = quartet("render", path, "--resolution", "32x18", "--samples", "1", "-o", tmp_path / "o.png")
     assert (tmp_path / "o.png").stat().st_size > 100
-    assert suffix == ".glb" or "no camera" in output and "no light" in output
+    assert suffix == ".glb" or ("no camera" in output and "no light" in output)
 
 
 def test_inspect_prints_the_plan(quartet, tmp_path):

@@ -40,7 +40,7 @@ gi_addon.unregister()
 def test_f12_in_the_window_renders_on_the_job_thread(tmp_path):
     """In a window render() runs on another thread while the interface lives."""
     answer = run(
-        f"""
+        """
 import os
 import gi_addon
 gi_addon.register()
