@@ -16,7 +16,7 @@ FOLDER = Path(__file__).resolve().parent.parent / "examples"
 
 def main() -> None:
     gi_addon.register()
-    scene = build(scenes.cornell())
+    scene = build(scenes.cornell(fov=1.15))
     scene.name = "Cornell box"
     scene.render.engine = "QUARTET"
     scene.render.resolution_x, scene.render.resolution_y = 960, 540

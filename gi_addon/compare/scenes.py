@@ -229,7 +229,9 @@ def _turned(quads: np.ndarray, degrees: float, center: Sequence[float]) -> np.nd
 # --- scenes -----------------------------------------------------------------------------------------------------------
 
 
-def cornell(*, blocks: bool = True, light: str = "spot", power: float = 60.0, aspect: float = 16 / 9) -> Scene:
+def cornell(
+    *, blocks: bool = True, light: str = "spot", power: float = 60.0, aspect: float = 16 / 9, fov: float = 0.85
+) -> Scene:
     """A Cornell box 2 m wide, open towards the camera at −y; ``light``: spot (from above, downwards), point, area, sun.
 
     The walls' backs face outwards, so that the camera's side is the only opening.
@@ -251,7 +253,7 @@ def cornell(*, blocks: bool = True, light: str = "spot", power: float = 60.0, as
         "area": lambda: area_light((0, 0, 1.99), (0, 0, 0), power, (0.5, 0.5)),
         "sun": lambda: sun_light((0.25, 0.8, -0.9), power / 10.0),
     }[light]())  # fmt: skip
-    return b.build(perspective((0, -4.2, 1.0), (0, 0, 1.0), 1.15, aspect))
+    return b.build(perspective((0, -4.2, 1.0), (0, 0, 1.0), fov, aspect))
 
 
 def integrating_sphere(
