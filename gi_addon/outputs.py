@@ -15,10 +15,11 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Output:
-    """A pass: Blender's ``name``, ``channels`` (as in ``register_pass``), socket ``kind``, the view layer's ``flag``,
-    the film ``layers`` it needs, and ``divide``: the layer of colour that its light is divided by."""
+    """A pass: Blender's ``name`` (``short`` before 5.0), ``channels`` (as in ``register_pass``), socket ``kind``, the view
+    layer's ``flag``, the film ``layers`` it needs, and ``divide``: the layer of colour that its light is divided by."""
 
     name: str
+    short: str
     channels: str
     kind: str
     flag: str
@@ -26,33 +27,35 @@ class Output:
     divide: str | None = None
 
 
-def _light(name: str, flag: str, layer: str, color: str) -> Output:
-    return Output(name, "RGB", "COLOR", flag, (layer, color), color)
+def _light(name: str, short: str, flag: str, layer: str, color: str) -> Output:
+    return Output(name, short, "RGB", "COLOR", flag, (layer, color), color)
 
 
 OUTPUTS: dict[str, Output] = {
     o.name: o
     for o in (
-        Output("Combined", "RGBA", "COLOR", "use_pass_combined", ("combined",)),
-        Output("Depth", "Z", "VALUE", "use_pass_z", ("depth",)),
-        Output("Normal", "XYZ", "VECTOR", "use_pass_normal", ("normal",)),
-        _light("Diffuse Direct", "use_pass_diffuse_direct", "diffuse_direct", "diffuse_color"),
-        _light("Diffuse Indirect", "use_pass_diffuse_indirect", "diffuse_indirect", "diffuse_color"),
-        Output("Diffuse Color", "RGB", "COLOR", "use_pass_diffuse_color", ("diffuse_color",)),
-        _light("Glossy Direct", "use_pass_glossy_direct", "glossy_direct", "glossy_color"),
-        _light("Glossy Indirect", "use_pass_glossy_indirect", "glossy_indirect", "glossy_color"),
-        Output("Glossy Color", "RGB", "COLOR", "use_pass_glossy_color", ("glossy_color",)),
-        _light("Transmission Direct", "use_pass_transmission_direct", "transmission_direct", "transmission_color"),
-        _light("Transmission Indirect", "use_pass_transmission_indirect", "transmission_indirect",
+        Output("Combined", "Combined", "RGBA", "COLOR", "use_pass_combined", ("combined",)),
+        Output("Depth", "Depth", "Z", "VALUE", "use_pass_z", ("depth",)),
+        Output("Normal", "Normal", "XYZ", "VECTOR", "use_pass_normal", ("normal",)),
+        _light("Diffuse Direct", "DiffDir", "use_pass_diffuse_direct", "diffuse_direct", "diffuse_color"),
+        _light("Diffuse Indirect", "DiffInd", "use_pass_diffuse_indirect", "diffuse_indirect", "diffuse_color"),
+        Output("Diffuse Color", "DiffCol", "RGB", "COLOR", "use_pass_diffuse_color", ("diffuse_color",)),
+        _light("Glossy Direct", "GlossDir", "use_pass_glossy_direct", "glossy_direct", "glossy_color"),
+        _light("Glossy Indirect", "GlossInd", "use_pass_glossy_indirect", "glossy_indirect", "glossy_color"),
+        Output("Glossy Color", "GlossCol", "RGB", "COLOR", "use_pass_glossy_color", ("glossy_color",)),
+        _light("Transmission Direct", "TransDir", "use_pass_transmission_direct", "transmission_direct", "transmission_color"),
+        _light("Transmission Indirect", "TransInd", "use_pass_transmission_indirect", "transmission_indirect",
                "transmission_color"),
-        Output("Transmission Color", "RGB", "COLOR", "use_pass_transmission_color", ("transmission_color",)),
-        Output("Volume Direct", "RGB", "COLOR", "cycles.use_pass_volume_direct", ("volume_direct",)),
-        Output("Emission", "RGB", "COLOR", "use_pass_emit", ("emission",)),
-        Output("Environment", "RGB", "COLOR", "use_pass_environment", ("environment",)),
-        Output("Ambient Occlusion", "RGB", "COLOR", "use_pass_ambient_occlusion", ("ao",)),
-        Output("Shadow", "RGB", "COLOR", "use_pass_shadow", ("shadow",)),
+        Output("Transmission Color", "TransCol", "RGB", "COLOR", "use_pass_transmission_color", ("transmission_color",)),
+        Output("Volume Direct", "VolumeDir", "RGB", "COLOR", "cycles.use_pass_volume_direct", ("volume_direct",)),
+        Output("Emission", "Emit", "RGB", "COLOR", "use_pass_emit", ("emission",)),
+        Output("Environment", "Env", "RGB", "COLOR", "use_pass_environment", ("environment",)),
+        Output("Ambient Occlusion", "AO", "RGB", "COLOR", "use_pass_ambient_occlusion", ("ao",)),
+        Output("Shadow", "Shadow", "RGB", "COLOR", "use_pass_shadow", ("shadow",)),
     )
 }  # fmt: skip
+
+LONG_NAMES = {o.short: o.name for o in OUTPUTS.values()}
 
 # Film layers and the graph resources that feed each. A layer whose resources are all absent stays black: there is no
 # such light in the scene.

@@ -50,12 +50,18 @@ def cycles(scene, *names, samples=64, bounces=0, seed=1):
 
 def diffuse(bpy, name="D", color=(0.8, 0.8, 0.8)):
     material = bpy.data.materials.new(name)
-    tree = material.node_tree
+    tree = tree_of(material)
     tree.nodes.clear()
     out, node = tree.nodes.new("ShaderNodeOutputMaterial"), tree.nodes.new("ShaderNodeBsdfDiffuse")
     node.inputs["Color"].default_value = (*color, 1.0)
     tree.links.new(node.outputs[0], out.inputs[0])
     return material
+
+
+def tree_of(data):
+    from gi_addon.host.compat import node_tree
+
+    return node_tree(data)
 
 
 LIGHTS = {
@@ -173,8 +179,8 @@ def test_view_layers_and_materials_linked_to_objects(blender, gl):
     hidden.objects.link(tall)
     second = scene.view_layers.new("Second")
     second.layer_collection.children["Hidden"].exclude = True
-    scene.render.image_settings.media_type = "MULTI_LAYER_IMAGE" if hasattr(
-        scene.render.image_settings, "media_type") else None  # fmt: skip
+    if hasattr(scene.render.image_settings, "media_type"):
+        scene.render.image_settings.media_type = "MULTI_LAYER_IMAGE"
     from gi_addon.compare import exr
 
     path = os.path.join(bpy.app.tempdir, "layers.exr")
@@ -292,7 +298,7 @@ def textured_plane(bpy, connect):
     """A UV-mapped plane whose material ``connect(tree, bsdf)`` fills."""
     scene = put(bpy, scenes.plane_scene(scenes.sun_light((0.5, 0.3, -1.0), 3.0)), samples=32)
     material = bpy.data.materials.new("T")
-    tree = material.node_tree
+    tree = tree_of(material)
     bsdf = tree.nodes["Principled BSDF"]
     connect(tree, bsdf)
     obj = next(o for o in scene.objects if o.type == "MESH")

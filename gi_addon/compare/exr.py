@@ -8,6 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ..outputs import LONG_NAMES
+
 # Channel letters in array order.
 _ORDER = ("R", "G", "B", "A", "X", "Y", "Z", "W", "V")
 
@@ -21,7 +23,7 @@ def _package():
 
 
 def read(path: str | Path) -> dict[str, np.ndarray]:
-    """Passes of a (multilayer) EXR by name, without the view layer's: (H, W, channels) f4, row 0 at the bottom."""
+    """Passes of a (multilayer) EXR by Blender 5's names, without the view layer's: (H, W, channels) f4, row 0 at the bottom."""
     layers: dict[str, dict[str, np.ndarray]] = {}
     file = _package().File(str(path), separate_channels=True)
     for part in file.parts:
@@ -32,7 +34,7 @@ def read(path: str | Path) -> dict[str, np.ndarray]:
     for name, channels in layers.items():
         letters = [letter for letter in _ORDER if letter in channels] or sorted(channels)
         stack = np.stack([channels[letter] for letter in letters], -1).astype(np.float32)
-        out[name] = np.ascontiguousarray(stack[::-1])
+        out[LONG_NAMES.get(name, name)] = np.ascontiguousarray(stack[::-1])
     return out
 
 

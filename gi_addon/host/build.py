@@ -9,6 +9,7 @@ import numpy as np
 from mathutils import Matrix
 
 from ..scene import CAMERA, DIFFUSE, GLOSSY, SHADOW, TRANSMISSION, VOLUME, Camera, Link, Mesh, Scene, ShaderGraph
+from .compat import node_tree
 
 _NODES = {
     "BSDF_DIFFUSE": "ShaderNodeBsdfDiffuse", "BSDF_PRINCIPLED": "ShaderNodeBsdfPrincipled",
@@ -53,7 +54,7 @@ def build(source: Scene, *, clear: bool = True) -> bpy.types.Scene:
         _camera(scene, source.camera)
     world = bpy.data.worlds.new("World")
     scene.world = world
-    _graph(world.node_tree, source.world.graph, "ShaderNodeOutputWorld")
+    _graph(node_tree(world), source.world.graph, "ShaderNodeOutputWorld")
     world.light_settings.distance = source.world.ao_distance
     return scene
 
@@ -82,9 +83,7 @@ def _mesh(mesh: Mesh) -> bpy.types.Mesh:
 
 def _material(name: str, graph: ShaderGraph) -> bpy.types.Material:
     material = bpy.data.materials.new(name)
-    if material.node_tree is None:
-        material.use_nodes = True
-    _graph(material.node_tree, graph, "ShaderNodeOutputMaterial")
+    _graph(node_tree(material), graph, "ShaderNodeOutputMaterial")
     return material
 
 

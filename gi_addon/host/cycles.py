@@ -110,11 +110,11 @@ def quiet() -> Iterator[None]:
         return
     sys.stdout.flush()
     saved = os.dup(1)
-    with open(os.devnull, "w") as nothing:
+    # Blender's C code writes to the descriptor, its Python side to sys.stdout.
+    with open(os.devnull, "w") as nothing, contextlib.redirect_stdout(nothing):
         os.dup2(nothing.fileno(), 1)
         try:
             yield
         finally:
-            sys.stdout.flush()
             os.dup2(saved, 1)
             os.close(saved)

@@ -16,11 +16,12 @@ import bpy
 import numpy as np
 
 from ..gl import Cancelled, CancelToken, GLError, shared
-from ..outputs import OUTPUTS
+from ..outputs import LONG_NAMES, OUTPUTS
 from ..renderer import Renderer, RenderError
 from ..scene import Scene
 from ..settings import SettingError, Settings
 from . import properties
+from .compat import pass_name
 from .sync import SceneSync
 
 _POLL_SECONDS = 0.05
@@ -153,7 +154,7 @@ class QuartetEngine(bpy.types.RenderEngine):
         result = self.begin_result(0, 0, width, height, layer=job.layer)
         try:
             for target in result.layers[0].passes:
-                array = passes.get(target.name)
+                array = passes.get(LONG_NAMES.get(target.name, target.name))
                 if array is None:
                     continue
                 rows, columns = height, width
@@ -178,7 +179,7 @@ class QuartetEngine(bpy.types.RenderEngine):
         for output in OUTPUTS.values():
             if output.name == "Combined" or pass_enabled(renderlayer, output):
                 self.register_pass(
-                    scene, renderlayer, output.name, len(output.channels), output.channels, output.kind
+                    scene, renderlayer, pass_name(output), len(output.channels), output.channels, output.kind
                 )
 
 

@@ -12,6 +12,7 @@ from mathutils import Vector
 
 from ..renderer import RenderError
 from . import cycles
+from .compat import node_tree
 
 _IMPORTERS = {
     ".glb": ("import_scene", "gltf"), ".gltf": ("import_scene", "gltf"), ".obj": ("wm", "obj_import"),
@@ -111,7 +112,7 @@ def _add_light(scene: bpy.types.Scene) -> None:
     scene.collection.objects.link(obj)
     if scene.world is None:
         scene.world = bpy.data.worlds.new("Quartet World")
-    if scene.world.node_tree is not None and "Background" in scene.world.node_tree.nodes:
-        background = scene.world.node_tree.nodes["Background"]
+    background = node_tree(scene.world).nodes.get("Background")
+    if background is not None:
         background.inputs["Color"].default_value = (0.5, 0.55, 0.6, 1.0)
         background.inputs["Strength"].default_value = 0.5

@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 
 from ..scene import Image, Link, Material, Node, ShaderGraph, World
+from .compat import uses_nodes
 
 _SRGB = ("sRGB", "sRGB - Texture", "Filmic sRGB", "AgX Base sRGB")
 _DATA = ("Non-Color", "Raw", "Generic Data", "Utility - Raw")
@@ -275,7 +276,7 @@ def _trees(data) -> Iterator[bpy.types.NodeTree]:
 def read_material(material: bpy.types.Material, images: ImageTable) -> Material:
     """A Material from Blender's."""
     graph = ShaderGraph()
-    if material.node_tree is not None and getattr(material, "use_nodes", True):
+    if uses_nodes(material):
         for tree in _trees(material):
             graph = GraphReader(images, f"material {material.name}").read(tree, "OUTPUT_MATERIAL")
     else:
@@ -298,7 +299,7 @@ def read_world(world: bpy.types.World | None, images: ImageTable) -> World:
     if world is None:
         return World()
     graph = ShaderGraph()
-    if world.node_tree is not None and getattr(world, "use_nodes", True):
+    if uses_nodes(world):
         for tree in _trees(world):
             graph = GraphReader(images, f"world {world.name}").read(tree, "OUTPUT_WORLD")
     else:

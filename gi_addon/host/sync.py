@@ -30,6 +30,7 @@ from ..scene import (
     Scene,
     World,
 )
+from .compat import uses_nodes
 from .materials import ImageTable, default_material, read_material, read_world
 
 _MESH_LIKE = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
@@ -373,7 +374,7 @@ def _read_light(instance, obj: bpy.types.Object, notes: list[str]) -> Light | No
     color = np.array(data.color, "f8")
     if getattr(data, "use_temperature", False):
         color = color * np.array(data.temperature_color, "f8")
-    if data.use_nodes and data.node_tree is not None:
+    if uses_nodes(data):
         color = color * _light_nodes(data, notes)
     matrix = np.array(instance.matrix_world, "f8")
     scale = [float(np.linalg.norm(matrix[:3, k])) for k in range(3)]
