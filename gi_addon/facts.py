@@ -34,6 +34,8 @@ class Facts:
     transparent: bool
     diffuse: bool
     glossy: bool
+    transmissive: bool
+    subsurface: bool
     layered: bool
     world_black: bool
     ao_distance: float
@@ -86,6 +88,8 @@ def gather_facts(
         transparent=any(c.transparent or c.transmissive for c in some),
         diffuse=any(c.diffuse or c.subsurface for c in some),
         glossy=any(c.glossy for c in some),
+        transmissive=any(c.transmissive for c in some),
+        subsurface=any(c.subsurface for c in some),
         layered=any(c.glossy or c.transmissive for c in compiled),
         world_black=world is None or world.black,
         ao_distance=s.ao.distance or scene.world.ao_distance,

@@ -94,10 +94,15 @@ class Buffer:
         return f"{self.count(facts)} × {self.struct}"
 
 
+def glsl_name(name: str) -> str:
+    """A resource's name in shaders by convention, for one that nothing declares."""
+    return name.replace("gbuffer.", "gbuf_").replace(".", "_")
+
+
 @dataclass(frozen=True)
 class Optional:
-    """A read that a pass can do without; its shaders see ``HAS_<GLSL NAME>`` 0 or 1. With ``only_for`` it is read only
-    where one of those writes of the pass is wanted."""
+    """A read that a pass can do without; its shaders see ``HAS_<GLSL NAME>`` 0 or 1. A technique need not have it. With
+    ``only_for`` it is read only where one of those writes of the pass is wanted."""
 
     name: str
     only_for: tuple[str, ...] = ()
@@ -287,7 +292,9 @@ def plan(passes: Iterable[Pass], facts: Facts, outputs: Mapping[str, str]) -> Pl
         reason = task.absent(facts)
         for read in task.reads:
             name = read.name if isinstance(read, Optional) else read
-            if name not in declared:
+            if name not in declared and isinstance(read, Optional):
+                missing.setdefault(name, "no pass of this technique makes it")
+            elif name not in declared:
                 raise ValueError(f"{task.title} reads {name}, which no earlier pass writes")
             if reason is None and not isinstance(read, Optional) and name in missing:
                 reason = f"needs {name}: {missing[name]}"
@@ -326,7 +333,8 @@ def plan(passes: Iterable[Pass], facts: Facts, outputs: Mapping[str, str]) -> Pl
         reads = [declared[name] for name in read_names]
         run.append(Planned(
             task, facts, reads, writes,
-            [declared[r.name].glsl for r in all_reads if r.name not in read_names],
+            [declared[r.name].glsl if r.name in declared else glsl_name(r.name) for r in all_reads
+             if r.name not in read_names],
             [w for w in task.writes if w not in writes],
             wanted[writes[0].name],
         ))  # fmt: skip

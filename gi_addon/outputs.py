@@ -58,10 +58,17 @@ OUTPUTS: dict[str, Output] = {
 LONG_NAMES = {o.short: o.name for o in OUTPUTS.values()}
 
 # Film layers and the graph resources that feed each. A layer whose resources are all absent stays black: there is no
-# such light in the scene.
+# such light in the scene. What these resources are (all full size, one texel a pixel):
+#   direct.diffuse, indirect.diffuse      radiance that a white Lambert surface would reflect, E/π, W/(m²·sr)
+#   direct.glossy, indirect.glossy        radiance that the glossy lobe reflects, with its colour
+#   transmission.direct, .indirect        radiance that comes through the surface, with its colour
+#   gbuffer.transmission                  the colour of what comes through
+#   volume.light                          radiance scattered towards the eye in front of the surface; alpha: the share
+#                                         of the light behind that still passes
 LAYERS: dict[str, tuple[str, ...]] = {
     "combined": (
         "gbuffer.depth", "gbuffer.diffuse", "gbuffer.emission", "direct.diffuse", "direct.glossy", "indirect.diffuse",
+        "indirect.glossy", "transmission.direct", "transmission.indirect", "volume.light",
     ),
     "depth": ("gbuffer.depth",),
     "normal": ("gbuffer.depth", "gbuffer.normal"),
@@ -69,13 +76,13 @@ LAYERS: dict[str, tuple[str, ...]] = {
     "diffuse_indirect": ("gbuffer.depth", "gbuffer.diffuse", "indirect.diffuse"),
     "diffuse_color": ("gbuffer.depth", "gbuffer.diffuse"),
     "glossy_direct": ("gbuffer.depth", "direct.glossy"),
-    "glossy_indirect": ("gbuffer.depth",),
+    "glossy_indirect": ("gbuffer.depth", "indirect.glossy"),
     "glossy_color": ("gbuffer.depth", "gbuffer.normal", "gbuffer.specular", "gbuffer.lobe", "brdf.albedo",
                      "brdf.average", "brdf.energy"),
-    "transmission_direct": ("gbuffer.depth",),
-    "transmission_indirect": ("gbuffer.depth",),
-    "transmission_color": ("gbuffer.depth",),
-    "volume_direct": ("gbuffer.depth",),
+    "transmission_direct": ("gbuffer.depth", "transmission.direct"),
+    "transmission_indirect": ("gbuffer.depth", "transmission.indirect"),
+    "transmission_color": ("gbuffer.depth", "gbuffer.transmission"),
+    "volume_direct": ("volume.light",),
     "emission": ("gbuffer.depth", "gbuffer.emission"),
     "environment": ("gbuffer.depth",),
     "ao": ("gbuffer.depth", "ao"),

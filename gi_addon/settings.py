@@ -117,10 +117,6 @@ class RSMSettings:
         200, "Samples", "Virtual point lights gathered per pixel and sub-frame", low=1, high=4096,
         higher="less blotchy near surfaces", lower="faster",
     )  # fmt: skip
-    gather_scale: int = _setting(
-        4, "Gather Scale", "Pixels per side of one low-resolution gather; the rest is interpolated where surfaces agree",
-        low=1, high=16, unit="px", higher="faster", lower="less blur; 1 gathers at every pixel",
-    )  # fmt: skip
 
 
 @dataclass
@@ -146,6 +142,10 @@ class Settings:
     bounces: int = _setting(
         1, "Bounces", "Diffuse bounces of light; 1 is the paper's", low=0, high=1,
         higher="brighter interiors", lower="0 is direct light only",
+    )  # fmt: skip
+    gather_scale: int = _setting(
+        4, "Gather Scale", "Pixels per side of one low-resolution gather; the rest is interpolated where surfaces agree",
+        low=1, high=16, unit="px", higher="faster", lower="less blur; 1 gathers at every pixel",
     )  # fmt: skip
     pixel_filter: str = _setting(
         "BOX", "Pixel Filter", "How sub-frames weigh in a pixel",

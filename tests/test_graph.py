@@ -100,9 +100,6 @@ class FlatAmbient(Pass):
     writes = (
         Texture("indirect.diffuse", "indirect_diffuse", "radiance a white Lambert surface would reflect, W/(m²·sr)",
                 "rgba32f", lambda f: f.resolution),
-        *(Texture(name, name.replace(".", "_"), "not made by this technique", "rgba32f", lambda f: f.resolution,
-                  when=lambda f: "this technique has none") for name in
-          ("direct.diffuse", "direct.glossy", "direct.shadow", "ao", "brdf.albedo", "brdf.average", "brdf.energy")),
     )  # fmt: skip
     uniforms = (Uniform("ambient", "vec3", "the colour, W/(m²·sr)"),)
     shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "flat_ambient_frag.glsl"}}
@@ -116,13 +113,7 @@ class FlatAmbient(Pass):
 
 
 def flat_ambient(settings, layers):
-    class Tables(_Made):
-        def __init__(self):
-            super().__init__("Tables", (), ("brdf.albedo", "brdf.average", "brdf.energy"), absent="not needed")
-
-    flat = FlatAmbient()
-    flat.writes = tuple(w for w in flat.writes if not w.name.startswith("brdf."))
-    return [Tables(), GBuffer(), flat, Resolve(layers)]
+    return [GBuffer(), FlatAmbient(), Resolve(layers)]
 
 
 def test_a_new_technique_is_a_list_of_passes(gl, monkeypatch):

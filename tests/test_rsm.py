@@ -37,7 +37,7 @@ def rectangle_form_factor(half: float, distance: float) -> float:
 def test_two_patches_match_their_form_factor(gl, distance, size):
     """E = B F with B = ρ E_sun cosθ, to 1 %."""
     albedo, scene = 0.6, scenes.two_patches(distance=distance, size=size, albedo=0.6)
-    image = make(scene, "Diffuse Indirect", "Depth", samples=16, rsm__samples=256, rsm__gather_scale=1,
+    image = make(scene, "Diffuse Indirect", "Depth", samples=16, rsm__samples=256, gather_scale=1,
                  use_ao=False).passes  # fmt: skip
     seen = image["Depth"][..., 0] < 1e9
     direction = np.array([0.0, 0.9, -1.0])
@@ -65,7 +65,7 @@ def test_interpolation_changes_little(gl):
     """The low-resolution gather keeps the mean within 1 %, and each pixel within 5 % in the mean."""
     scene = scenes.cornell()
     full, low = (
-        make(scene, "Diffuse Indirect", samples=8, resolution=(192, 108), rsm__gather_scale=s).passes["Diffuse Indirect"]
+        make(scene, "Diffuse Indirect", samples=8, resolution=(192, 108), gather_scale=s).passes["Diffuse Indirect"]
         for s in (1, 4)
     )
     assert low.mean() == pytest.approx(full.mean(), rel=0.01)
@@ -151,7 +151,7 @@ def test_a_flat_receiver_shows_no_bands_and_sets_agree(gl):
     b.quads(np.array([[[-2, 2, 0], [2, 2, 0], [2, 2, 3], [-2, 2, 3]]])[:, ::-1], scenes.diffuse((0.8,) * 3))
     b.light(scenes.sun_light((0.0, 1.0, -0.35), 5.0))
     scene = b.build(scenes.perspective((0, 0.0, 3.0), (0, -0.4, 0), 0.45))
-    image = make(scene, "Diffuse Indirect", samples=16, rsm__gather_scale=1, use_ao=False).passes["Diffuse Indirect"][..., 0]
+    image = make(scene, "Diffuse Indirect", samples=16, gather_scale=1, use_ao=False).passes["Diffuse Indirect"][..., 0]
     kernel = np.ones(7) / 7
     blurred = np.apply_along_axis(lambda r: np.convolve(r, kernel, "valid"), 1, image)
     blurred = np.apply_along_axis(lambda c: np.convolve(c, kernel, "valid"), 0, blurred)

@@ -141,10 +141,10 @@ class InterpolatedIndirect(Pass):
     shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/rsm/gather_low_frag.glsl"}}
 
     def defines(self, facts: Facts) -> dict[str, int]:
-        return {"GATHER_SCALE": facts.settings.rsm.gather_scale}
+        return {"GATHER_SCALE": facts.settings.gather_scale}
 
     def absent(self, facts: Facts) -> str | None:
-        return None if facts.settings.rsm.gather_scale > 1 else "every pixel gathers for itself"
+        return None if facts.settings.gather_scale > 1 else "every pixel gathers for itself"
 
     def run(self, frame: Frame, planned: Planned) -> None:
         program = frame.program(planned)
@@ -170,7 +170,7 @@ class IndirectLighting(Pass):
     shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/rsm/lighting_frag.glsl"}}
 
     def defines(self, facts: Facts) -> dict[str, int]:
-        return {"GATHER_SCALE": facts.settings.rsm.gather_scale}
+        return {"GATHER_SCALE": facts.settings.gather_scale}
 
     def run(self, frame: Frame, planned: Planned) -> None:
         program = frame.program(planned)

@@ -20,7 +20,7 @@ def _screen(facts: Facts) -> tuple[int, int]:
 
 def gather_size(facts: Facts) -> tuple[int, int]:
     """Texels of the low-resolution gather: the blocks that cover the picture wherever their grid starts."""
-    scale = facts.settings.rsm.gather_scale
+    scale = facts.settings.gather_scale
     return tuple(-(-(n + scale - 1) // scale) for n in facts.resolution)
 
 
@@ -90,7 +90,7 @@ class GBufferMips(Pass):
     shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "passes/gbuffer_mips_frag.glsl"}}
 
     def defines(self, facts: Facts) -> dict[str, int]:
-        return {"GATHER_SCALE": facts.settings.rsm.gather_scale}
+        return {"GATHER_SCALE": facts.settings.gather_scale}
 
     def run(self, frame: Frame, planned: Planned) -> None:
         frame.screen(planned, frame.program(planned))

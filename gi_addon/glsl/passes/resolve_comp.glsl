@@ -36,8 +36,12 @@ void main()
     vec3 diffuse_indirect = vec3(0.0);
     vec3 glossy_direct = vec3(0.0);
     vec3 glossy_indirect = vec3(0.0);
+    vec3 through_direct = vec3(0.0);
+    vec3 through_indirect = vec3(0.0);
+    vec3 through_color = vec3(0.0);
     vec3 emission = vec3(0.0);
     vec3 environment = vec3(0.0);
+    vec3 volume = vec3(0.0);
 
     if (surface) {
 #if HAS_GBUF_DIFFUSE
@@ -52,17 +56,43 @@ void main()
 #if HAS_DIRECT_GLOSSY
         glossy_direct = texelFetch(direct_glossy, pixel, 0).rgb;
 #endif
+#if HAS_INDIRECT_GLOSSY
+        glossy_indirect = texelFetch(indirect_glossy, pixel, 0).rgb;
+#endif
+#if HAS_GBUF_TRANSMISSION
+        through_color = texelFetch(gbuf_transmission, pixel, 0).rgb;
+#endif
+#if HAS_TRANSMISSION_DIRECT
+        through_direct = texelFetch(transmission_direct, pixel, 0).rgb;
+#endif
+#if HAS_TRANSMISSION_INDIRECT
+        through_indirect = texelFetch(transmission_indirect, pixel, 0).rgb;
+#endif
 #if HAS_GBUF_EMISSION
         emission = texelFetch(gbuf_emission, pixel, 0).rgb;
 #endif
     } else if (view.film_transparent < 0.5) {
         environment = world_radiance(normalize(ray_direction_ws(uv)));
     }
+#if HAS_VOLUME_LIGHT
+    // What is behind a medium arrives dimmed, in every pass, as in Cycles.
+    vec4 medium = texelFetch(volume_light, pixel, 0);
+    volume = medium.rgb;
+    diffuse_direct *= medium.a;
+    diffuse_indirect *= medium.a;
+    glossy_direct *= medium.a;
+    glossy_indirect *= medium.a;
+    through_direct *= medium.a;
+    through_indirect *= medium.a;
+    emission *= medium.a;
+    environment *= medium.a;
+#endif
 
 #if LAYER_COMBINED >= 0
     float alpha = surface || view.film_transparent < 0.5 ? 1.0 : 0.0;
-    add(LAYER_COMBINED, pixel, vec4(diffuse_direct + diffuse_indirect + glossy_direct + glossy_indirect + emission +
-                                    environment, alpha));
+    add(LAYER_COMBINED, pixel, vec4(diffuse_direct + diffuse_indirect + glossy_direct + glossy_indirect +
+                                        through_direct + through_indirect + volume + emission + environment,
+                                    alpha));
 #endif
 #if LAYER_DEPTH >= 0
     // The first sub-frame's depth, as Cycles keeps its first sample's: a mean of depths is no depth. Nothing is 1e10.
@@ -109,16 +139,16 @@ void main()
     add(LAYER_GLOSSY_COLOR, pixel, vec4(glossy_color, 1.0));
 #endif
 #if LAYER_TRANSMISSION_DIRECT >= 0
-    add(LAYER_TRANSMISSION_DIRECT, pixel, vec4(0.0));
+    add(LAYER_TRANSMISSION_DIRECT, pixel, vec4(through_direct, 1.0));
 #endif
 #if LAYER_TRANSMISSION_INDIRECT >= 0
-    add(LAYER_TRANSMISSION_INDIRECT, pixel, vec4(0.0));
+    add(LAYER_TRANSMISSION_INDIRECT, pixel, vec4(through_indirect, 1.0));
 #endif
 #if LAYER_TRANSMISSION_COLOR >= 0
-    add(LAYER_TRANSMISSION_COLOR, pixel, vec4(0.0));
+    add(LAYER_TRANSMISSION_COLOR, pixel, vec4(through_color, 1.0));
 #endif
 #if LAYER_VOLUME_DIRECT >= 0
-    add(LAYER_VOLUME_DIRECT, pixel, vec4(0.0));
+    add(LAYER_VOLUME_DIRECT, pixel, vec4(volume, 1.0));
 #endif
 #if LAYER_EMISSION >= 0
     add(LAYER_EMISSION, pixel, vec4(emission, 1.0));

@@ -1,20 +1,13 @@
 // Indirect light per pixel: interpolated from the low resolution where that holds the pixel's surface, gathered afresh
 // where it does not (Dachsbacher and Stamminger 2005, §4.3; paper §IV-B).
-//
-// A neighbour counts if its triangle's plane is the pixel's within the blocks' own footprint and faces the same way
-// within 25°: relative to the picture, not to world units. Its irradiance is turned to the pixel's shading normal by the
-// linear irradiance model E(n) ∝ R0/4 + R1·n/2 (R. Ramamoorthi and P. Hanrahan, SIGGRAPH 2001, orders 0 and 1).
 
 #include "lib/view_lib.glsl"
 #include "lib/sequence_lib.glsl"
-#include "passes/gather_grid.glsl"
 #include "engines/rsm/gather_lib.glsl"
-
-const float SAME_FACING = 0.906; // cos 25°
-// Share of the bilinear weight that must be on the pixel's surface.
-const float ENOUGH = 0.5;
-
-float linear_irradiance(vec4 direction, vec3 n) { return max(0.25 * direction.w + 0.5 * dot(direction.xyz, n), 0.0); }
+#include "passes/gather_grid.glsl"
+#if HAS_LOW_INDIRECT
+#include "passes/interpolate.glsl"
+#endif
 
 void main()
 {
@@ -29,50 +22,16 @@ void main()
     vec4 normals = texelFetch(gbuf_normal, pixel, 0);
     vec3 n = octahedral_decode(normals.xy);
     vec3 ng = octahedral_decode(normals.zw);
-    float contact = 1.0;
-#if HAS_AO
-    contact = texelFetch(ao, pixel, 0).g; // virtual point lights see through everything
-#endif
+    vec3 radiance = vec3(0.0);
+    bool found = false;
 #if HAS_LOW_INDIRECT
-    float scale = float(GATHER_SCALE);
-    vec2 at = (gl_FragCoord.xy + vec2(gather_grid_offset())) / scale - 0.5;
-    ivec2 base = ivec2(floor(at));
-    vec2 f = at - vec2(base);
-    ivec2 last = textureSize(low_depth, 0) - 1;
-    vec3 sum = vec3(0.0);
-    float weight = 0.0;
-    for (int k = 0; k < 4; ++k) {
-        ivec2 corner = ivec2(k & 1, k >> 1);
-        ivec2 block = clamp(base + corner, ivec2(0), last);
-        float other_depth = texelFetch(low_depth, block, 0).r;
-        if (other_depth <= 0.0) {
-            continue;
-        }
-        vec4 other = texelFetch(low_normal, block, 0);
-        vec3 other_ng = octahedral_decode(other.zw);
-        if (dot(other_ng, ng) < SAME_FACING) {
-            continue;
-        }
-        vec2 other_uv = (vec2(gather_grid_pixel(block, texelFetch(low_pixel, block, 0).rg)) + 0.5) * view.inverse_resolution;
-        vec3 to_other = position_ws_from_depth(other_uv, other_depth) - position_ws;
-        // Off the plane by less than half a block's width: the same surface, seen from here.
-        if (abs(dot(to_other, ng)) > 0.5 * scale * pixel_width(depth)) {
-            continue;
-        }
-        vec2 s = mix(1.0 - f, f, vec2(corner));
-        float w = max(s.x * s.y, 1e-3);
-        vec3 other_n = octahedral_decode(other.xy);
-        vec4 direction = texelFetch(low_direction, block, 0);
-        float from = linear_irradiance(direction, other_n);
-        // Turning may dim to nothing, and brighten by the two-fold at most that 25° can make of an even sky.
-        float turn = from > 0.0 ? min(linear_irradiance(direction, n) / from, 2.0) : 1.0;
-        sum += w * turn * texelFetch(low_indirect, block, 0).rgb;
-        weight += w;
-    }
-    if (weight >= ENOUGH) {
-        indirect_diffuse = vec4(sum / weight * contact, 1.0);
-        return;
-    }
+    found = interpolated_indirect(position_ws, n, ng, depth, radiance);
 #endif
-    indirect_diffuse = vec4(gather_vpls(position_ws, n, ng).radiance * contact, 1.0);
+    if (!found) {
+        radiance = gather_vpls(position_ws, n, ng).radiance;
+    }
+#if HAS_AO
+    radiance *= texelFetch(ao, pixel, 0).g; // virtual point lights see through everything
+#endif
+    indirect_diffuse = vec4(radiance, 1.0);
 }

@@ -1,0 +1,54 @@
+// Indirect light of a pixel from the low-resolution gather, where that holds the pixel's surface (Dachsbacher and
+// Stamminger 2005, §4.3; paper §IV-B). Included after view_lib, math_lib, sequence_lib and gather_grid, where the
+// low-resolution G-buffer, `low_indirect` and `low_direction` are declared.
+//
+// A neighbour counts if its triangle's plane is the pixel's within the blocks' own footprint and faces the same way
+// within 25°: relative to the picture, not to world units. Its irradiance is turned to the pixel's shading normal by the
+// linear irradiance model E(n) ∝ R0/4 + R1·n/2 (R. Ramamoorthi and P. Hanrahan, SIGGRAPH 2001, orders 0 and 1).
+
+const float SAME_FACING = 0.906; // cos 25°
+// Share of the bilinear weight that must be on the pixel's surface.
+const float ENOUGH = 0.5;
+
+float linear_irradiance(vec4 direction, vec3 n) { return max(0.25 * direction.w + 0.5 * dot(direction.xyz, n), 0.0); }
+
+// False where too little of the neighbourhood is this surface: gather afresh.
+bool interpolated_indirect(vec3 position_ws, vec3 n, vec3 ng, float depth, out vec3 radiance)
+{
+    float scale = float(GATHER_SCALE);
+    vec2 at = (gl_FragCoord.xy + vec2(gather_grid_offset())) / scale - 0.5;
+    ivec2 base = ivec2(floor(at));
+    vec2 f = at - vec2(base);
+    ivec2 last = textureSize(low_depth, 0) - 1;
+    vec3 sum = vec3(0.0);
+    float weight = 0.0;
+    for (int k = 0; k < 4; ++k) {
+        ivec2 corner = ivec2(k & 1, k >> 1);
+        ivec2 block = clamp(base + corner, ivec2(0), last);
+        float other_depth = texelFetch(low_depth, block, 0).r;
+        if (other_depth <= 0.0) {
+            continue;
+        }
+        vec4 other = texelFetch(low_normal, block, 0);
+        vec3 other_ng = octahedral_decode(other.zw);
+        if (dot(other_ng, ng) < SAME_FACING) {
+            continue;
+        }
+        ivec2 pixel = gather_grid_pixel(block, texelFetch(low_pixel, block, 0).rg);
+        vec3 other_ws = position_ws_from_depth((vec2(pixel) + 0.5) * view.inverse_resolution, other_depth);
+        // Off the plane by less than half a block's width: the same surface, seen from here.
+        if (abs(dot(other_ws - position_ws, ng)) > 0.5 * scale * pixel_width(depth)) {
+            continue;
+        }
+        vec2 s = mix(1.0 - f, f, vec2(corner));
+        float w = max(s.x * s.y, 1e-3);
+        vec4 direction = texelFetch(low_direction, block, 0);
+        float from = linear_irradiance(direction, octahedral_decode(other.xy));
+        // Turning may dim to nothing, and brighten by the two-fold at most that 25° can make of an even sky.
+        float turn = from > 0.0 ? min(linear_irradiance(direction, n) / from, 2.0) : 1.0;
+        sum += w * turn * texelFetch(low_indirect, block, 0).rgb;
+        weight += w;
+    }
+    radiance = weight > 0.0 ? sum / weight : vec3(0.0);
+    return weight >= ENOUGH;
+}
