@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .lights import Emitters, LightRig, build_rig
-from .materials import CompiledGraph
+from .materials import CompiledGraph, Medium, mean_medium
 from .outputs import film_layers
 from .scene import CAMERA, Scene
 from .settings import Settings
@@ -39,6 +39,7 @@ class Facts:
     layered: bool
     world_black: bool
     ao_distance: float
+    medium: Medium | None = None  # that fills the world
     stamps: dict[str, str] = field(default_factory=dict)
 
     @property
@@ -93,5 +94,6 @@ def gather_facts(
         layered=any(c.glossy or c.transmissive for c in compiled),
         world_black=world is None or world.black,
         ao_distance=s.ao.distance or scene.world.ao_distance,
+        medium=mean_medium(scene.world.graph, scene.images),
         stamps=scene.stamps(),
     )

@@ -252,7 +252,9 @@ class GPUScene:
     def draw(self, planned: Planned, stages, visibility: int, clip_from_world: np.ndarray, **options) -> None:
         """Draw surfaces that ``visibility`` rays see, each with its material's function.
 
-        ``stages`` are the pass's shader files; ``options`` go to :meth:`_programs`.
+        ``stages`` are the pass's shader files. Options: ``full`` evaluates every material, else only those that let light
+        through; ``units`` is the first texture unit free for materials; ``defines``; ``only`` draws materials with that
+        flag of CompiledGraph alone.
         """
         draws, prepared = self._prepared(planned, stages, visibility, options)
         commands, counts = draws.visible(clip_from_world)
@@ -275,9 +277,9 @@ class GPUScene:
 
     def _prepared(self, planned: Planned, stages, visibility: int, options) -> tuple[DrawList, list[tuple]]:
         """The draw list, and (material, program, vertex array) of each of its batches; kept with the pass."""
-        full, units = options["full"], options["units"]
-        draws = self._draw_list(visibility, opaque_together=not full)
-        key = ("draws", visibility, full)
+        full, units, only = options["full"], options["units"], options.get("only", "")
+        draws = self._draw_list(visibility, opaque_together=not full, only=only)
+        key = ("draws", visibility, full, only, tuple(sorted(options.get("defines", {}).items())))
         cached = planned.programs.get(key)
         if cached is not None and cached[0] is draws and all(self._vaos.get(k) is v for k, v in cached[2]):
             return draws, cached[1]
@@ -318,9 +320,9 @@ class GPUScene:
             virtual=virtual,
         )
 
-    def _draw_list(self, visibility: int, *, opaque_together: bool) -> DrawList:
-        """Indirect commands of what ``visibility`` rays see."""
-        key = (visibility, opaque_together)
+    def _draw_list(self, visibility: int, *, opaque_together: bool, only: str = "") -> DrawList:
+        """Indirect commands of what ``visibility`` rays see; ``only`` names a flag that a material must have."""
+        key = (visibility, opaque_together, only)
         if key in self._draws:
             return self._draws[key]
         rows: list[tuple] = []
@@ -333,6 +335,8 @@ class GPUScene:
             for slot, first, triangles, box in self._chunks[mesh_index]:
                 material = used[min(slot, len(used) - 1)]
                 compiled = self.compiled[material]
+                if only and not getattr(compiled, only):
+                    continue
                 if opaque_together and not (compiled.transparent or compiled.transmissive):
                     material = -1
                 materials[material] = None

@@ -215,9 +215,9 @@ class Planned:
                 f"layout(std430, binding = {binding}) {mode}buffer {buffer.glsl}_block"
                 f" {{ {buffer.struct} {buffer.glsl}[]; }};"
             )
-        for slot, texture in enumerate(self.texture_writes()):
+        for slot, texture in enumerate(w for w in self.texture_writes() if w.format != "depth24"):
             f = FORMATS[texture.format]
-            if stage == "fragment" and texture.format != "depth24":
+            if stage == "fragment":
                 lines.append(f"layout(location = {slot}) out {f.value_type} {texture.glsl};")
             elif stage == "compute":
                 access = "" if texture.access == "readwrite" else f"{texture.access} "
@@ -336,7 +336,7 @@ def plan(passes: Iterable[Pass], facts: Facts, outputs: Mapping[str, str]) -> Pl
             [declared[r.name].glsl if r.name in declared else glsl_name(r.name) for r in all_reads
              if r.name not in read_names],
             [w for w in task.writes if w not in writes],
-            wanted[writes[0].name],
+            next(wanted[w.name] for w in writes if w.name in wanted),
         ))  # fmt: skip
         for read in reads:
             wanted.setdefault(read.name, f"{task.title} reads {read.name}")

@@ -61,14 +61,15 @@ LONG_NAMES = {o.short: o.name for o in OUTPUTS.values()}
 # such light in the scene. What these resources are (all full size, one texel a pixel):
 #   direct.diffuse, indirect.diffuse      radiance that a white Lambert surface would reflect, E/π, W/(m²·sr)
 #   direct.glossy, indirect.glossy        radiance that the glossy lobe reflects, with its colour
-#   transmission.direct, .indirect        radiance that comes through the surface, with its colour
-#   gbuffer.transmission                  the colour of what comes through
+#   gbuffer.transmission                  tint of the refracting surfaces in front; 1 where there is none
+#   transmission.indirect                 radiance that arrives through them, tinted, where the technique knows it (alpha 1);
+#                                         elsewhere they show what is straight behind
 #   volume.light                          radiance scattered towards the eye in front of the surface; alpha: the share
 #                                         of the light behind that still passes
 LAYERS: dict[str, tuple[str, ...]] = {
     "combined": (
         "gbuffer.depth", "gbuffer.diffuse", "gbuffer.emission", "direct.diffuse", "direct.glossy", "indirect.diffuse",
-        "indirect.glossy", "transmission.direct", "transmission.indirect", "volume.light",
+        "indirect.glossy", "gbuffer.transmission", "transmission.indirect", "volume.light",
     ),
     "depth": ("gbuffer.depth",),
     "normal": ("gbuffer.depth", "gbuffer.normal"),
@@ -79,8 +80,11 @@ LAYERS: dict[str, tuple[str, ...]] = {
     "glossy_indirect": ("gbuffer.depth", "indirect.glossy"),
     "glossy_color": ("gbuffer.depth", "gbuffer.normal", "gbuffer.specular", "gbuffer.lobe", "brdf.albedo",
                      "brdf.average", "brdf.energy"),
-    "transmission_direct": ("gbuffer.depth", "transmission.direct"),
-    "transmission_indirect": ("gbuffer.depth", "transmission.indirect"),
+    "transmission_direct": ("gbuffer.depth", "gbuffer.transmission", "gbuffer.diffuse", "gbuffer.emission",
+                            "direct.diffuse", "direct.glossy"),
+    "transmission_indirect": ("gbuffer.depth", "gbuffer.transmission", "gbuffer.diffuse", "gbuffer.emission",
+                              "direct.diffuse", "direct.glossy", "indirect.diffuse", "indirect.glossy",
+                              "transmission.indirect"),
     "transmission_color": ("gbuffer.depth", "gbuffer.transmission"),
     "volume_direct": ("volume.light",),
     "emission": ("gbuffer.depth", "gbuffer.emission"),

@@ -15,22 +15,24 @@ from gi_addon.settings import SettingError, Settings, markdown, walk
 # A value unlike the default for every setting, so that a new one without an entry fails here.
 OTHER = {
     "technique": None, "use_indirect_diffuse": False, "use_glossy": None, "use_shadows": False, "use_ao": False,
-    "use_translucency": None, "use_volumetric": None, "use_area_lights": False, "samples": 3,
+    "use_translucency": False, "use_volumetric": None, "use_area_lights": False, "samples": 3,
     "viewport_samples": None, "bounces": 0, "pixel_filter": "BLACKMAN_HARRIS", "filter_width": 3.0,
     "shadows.resolution": 64, "shadows.softness": 6.0, "ao.samples": 1, "ao.steps": 1, "ao.distance": 0.3,
     "ao.contact": 0.5, "world.samples": 1, "world.resolution": 64, "rsm.resolution": 32, "rsm.samples": 7,
     "gather_scale": 1,
 }  # fmt: skip
 # Not read by the picture itself: the viewport's own number of sub-frames; and effects whose techniques have yet to land.
-ELSEWHERE = {"viewport_samples", "technique", "use_glossy", "use_translucency", "use_volumetric"}
+ELSEWHERE = {"viewport_samples", "technique", "use_glossy", "use_volumetric"}
 
 
 @functools.cache
 def scene():
-    """Something of everything: sun, area light, world, occluders, gloss."""
+    """Something of everything: sun, area light, world, occluders, gloss, glass."""
     s = scenes.cornell(light="area")
     s.lights.append(scenes.sun_light((0.25, 0.8, -0.9), 3.0, 0.02))
     s.materials[0] = scenes.principled(Base_Color=scenes.WHITE, Roughness=0.3)
+    s.materials.append(scenes.principled(Transmission_Weight=0.8, Roughness=0.1))
+    s.instances.materials[-1] = (len(s.materials) - 1,)
     s.world = scenes.world((0.3, 0.4, 0.5))
     return s
 

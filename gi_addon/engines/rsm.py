@@ -15,7 +15,7 @@ from ..graph import Buffer, Optional, Pass, Planned, Texture, Uniform
 from ..passes.ao import AOBlur, AOGeneration
 from ..passes.brdf_tables import BRDFTables
 from ..passes.direct_lighting import DirectLighting
-from ..passes.gbuffer import GBuffer, GBufferMips, _screen, gather_size
+from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentTint, _screen, gather_size
 from ..passes.lights import LightList, RSMGeneration, ShadowMaps
 from ..passes.resolve import Resolve
 from ..settings import Settings
@@ -31,6 +31,7 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         RSMFlux(),
         RSMSamplingPattern(),
         GBuffer(),
+        TranslucentTint(),
         GBufferMips(),
         AOGeneration(),
         AOBlur(),

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -28,6 +29,42 @@ def mean_emission(graph: ShaderGraph, images: Sequence[Image]) -> np.ndarray:
     if graph.surface is None:
         return np.zeros(3)
     return _Walk(graph, images).closure(graph.surface, 0)
+
+
+@dataclass(frozen=True)
+class Medium:
+    """A homogeneous participating medium: scattering and absorption (3,) per metre, emission (3,) W/(m³·sr), and the
+    Henyey-Greenstein ``anisotropy`` of its phase function."""
+
+    scattering: tuple[float, float, float]
+    absorption: tuple[float, float, float]
+    emission: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    anisotropy: float = 0.0
+
+    @property
+    def extinction(self) -> np.ndarray:
+        return np.array(self.scattering) + np.array(self.absorption)
+
+
+def mean_medium(graph: ShaderGraph, images: Sequence[Image]) -> Medium | None:
+    """The mean medium of a volume graph; None where there is none."""
+    if graph.volume is None:
+        return None
+    found = _Walk(graph, images).medium(graph.volume, 0)
+    return found if (found.extinction > 0.0).any() or any(found.emission) else None
+
+
+def _sum(parts: Sequence[Medium]) -> Medium:
+    weights = [float(np.sum(p.scattering)) for p in parts]
+    total = sum(weights)
+    return Medium(
+        *(tuple(np.sum([getattr(p, name) for p in parts], axis=0)) for name in ("scattering", "absorption", "emission")),
+        sum(w * p.anisotropy for w, p in zip(weights, parts, strict=True)) / total if total > 0.0 else 0.0,
+    )
+
+
+def _scaled(m: Medium, k: float) -> Medium:
+    return Medium(*(tuple(k * np.array(getattr(m, n))) for n in ("scattering", "absorption", "emission")), m.anisotropy)
 
 
 class _Walk:
@@ -51,6 +88,37 @@ class _Walk:
             a, b = self.closure(get("Shader"), depth + 1), self.closure(get("Shader_001"), depth + 1)
             return a * (1.0 - t) + b * t
         return np.zeros(3)
+
+    def medium(self, link: Link | None, depth: int) -> Medium:
+        """Blender's volume nodes: Scatter and Absorption are colour × density (absorption 1 − colour), Principled both."""
+        nothing = Medium((0.0,) * 3, (0.0,) * 3)
+        if not isinstance(link, Link) or depth > 64:
+            return nothing
+        node = self.graph.nodes[link.node]
+        get = node.inputs.get
+        if node.kind == "ADD_SHADER":
+            return _sum([self.medium(get("Shader"), depth + 1), self.medium(get("Shader_001"), depth + 1)])
+        if node.kind == "MIX_SHADER":
+            t = float(np.clip(self.number(get("Fac", 0.5), depth), 0.0, 1.0))
+            a, b = self.medium(get("Shader"), depth + 1), self.medium(get("Shader_001"), depth + 1)
+            return _sum([_scaled(a, 1.0 - t), _scaled(b, t)])
+        if node.kind == "EMISSION":
+            radiance = self.color(get("Color", 1.0), depth) * self.number(get("Strength", 1.0), depth)
+            return Medium((0.0,) * 3, (0.0,) * 3, tuple(radiance))
+        density = max(self.number(get("Density", 1.0), depth), 0.0)
+        color = np.clip(self.color(get("Color", 0.5 if node.kind == "PRINCIPLED_VOLUME" else 0.8), depth), 0.0, 1.0)
+        anisotropy = float(np.clip(self.number(get("Anisotropy", 0.0), depth), -0.99, 0.99))
+        if node.kind == "VOLUME_SCATTER":
+            return Medium(tuple(color * density), (0.0,) * 3, anisotropy=anisotropy)
+        if node.kind == "VOLUME_ABSORPTION":
+            return Medium((0.0,) * 3, tuple((1.0 - color) * density))
+        if node.kind == "PRINCIPLED_VOLUME":
+            # What is not scattered is absorbed, tinted by the square root of the absorption colour.
+            tint = np.sqrt(np.clip(self.color(get("Absorption Color", 0.0), depth), 0.0, 1.0))
+            emission = self.color(get("Emission Color", 1.0), depth) * self.number(get("Emission Strength", 0.0), depth)
+            return Medium(tuple(color * density), tuple(np.maximum((1.0 - color) * (1.0 - tint), 0.0) * density),
+                          tuple(emission), anisotropy)  # fmt: skip
+        return nothing
 
     def number(self, value, depth: int) -> float:
         v = self.value(value, depth + 1)

@@ -41,6 +41,9 @@ class GBuffer(Pass):
                 _screen, when=lambda f: None if f.glossy else "no visible material is glossy"),
         Texture("gbuffer.emission", "gbuf_emission", "emitted radiance, W/(m²·sr)", "rgba32f", _screen,
                 when=lambda f: None if f.emissive else "no visible material emits"),
+        Texture("gbuffer.subsurface", "gbuf_subsurface", "mean free path in m; share of the diffuse albedo that scatters "
+                "below the surface", "rgba16f", _screen,
+                when=lambda f: None if f.subsurface else "no visible material scatters below its surface"),
         Texture("gbuffer.z", "gbuf_z", "depth buffer", "depth24", _screen, scratch=True),
     )  # fmt: skip
 
@@ -67,6 +70,86 @@ class GBuffer(Pass):
                 "SURFACE_SEEN_BY_SHADOW": 0,
             },
         )  # fmt: skip
+
+
+class TranslucentLayer(Pass):
+    """The nearest refracting surface of each pixel.
+
+    The opaque G-buffer sees through refracting surfaces: in a sub-frame where a surface's refracting share is chosen, it
+    holds what lies behind, and this layer what lies in front.
+    """
+
+    title = "Transparency G-buffers Generation"
+    figure = "G-buffers + Transparency G-buffers Generation"
+    reads = ("gbuffer.depth", Optional("brdf.albedo"), Optional("brdf.average"), Optional("brdf.energy"))
+    writes = (
+        Texture("translucent.depth", "translucent_depth", "view depth, world units; 0 where nothing refracts in front of "
+                "the opaque surface", "r32f", _screen),
+        Texture("translucent.normal", "translucent_normal", "shading normal and triangle's normal, as gbuffer.normal",
+                "rgba16", _screen),
+        Texture("translucent.color", "translucent_color", "tint of what passes this surface; roughness", "rgba16f", _screen),
+        Texture("translucent.medium", "translucent_medium", "index of refraction as seen from the camera's side; 1 where "
+                "the light is scattered on to the far side instead (translucent)", "rg16f", _screen),
+        Texture("translucent.z", "translucent_z", "depth buffer", "depth24", _screen, scratch=True),
+    )  # fmt: skip
+
+    def absent(self, facts: Facts) -> str | None:
+        return _nothing_refracts(facts)
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        _draw_translucent(frame, planned, clear=0.0, mode=moderngl.DEPTH_TEST)
+
+
+class TranslucentTint(Pass):
+    """The tint of all refracting surfaces down to the opaque one: each multiplies what is behind it."""
+
+    title = "Transparency Tint"
+    reads = TranslucentLayer.reads
+    writes = (
+        Texture("gbuffer.transmission", "gbuf_transmission", "tint of all refracting surfaces in front of the opaque one",
+                "rgba16f", _screen),
+    )  # fmt: skip
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return {f"HAS_{w.glsl.upper()}": 0 for w in TranslucentLayer.writes}
+
+    def absent(self, facts: Facts) -> str | None:
+        return _nothing_refracts(facts)
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        frame.gl.ctx.blend_func = moderngl.ZERO, moderngl.SRC_COLOR
+        _draw_translucent(frame, planned, clear=1.0, mode=moderngl.BLEND)
+        frame.gl.ctx.blend_func = moderngl.DEFAULT_BLENDING
+
+
+def _nothing_refracts(facts: Facts) -> str | None:
+    if not facts.settings.use_translucency:
+        return "translucency is switched off"
+    return None if facts.transmissive else "no visible material refracts"
+
+
+def _draw_translucent(frame: Frame, planned: Planned, *, clear: float, mode: int) -> None:
+    fbo = frame.targets(planned)
+    fbo.use()
+    fbo.scissor = None
+    fbo.viewport = (0, 0, *fbo.size)
+    fbo.clear(clear, clear, clear, clear, depth=1.0)
+    frame.gl.ctx.enable_only(mode)
+    frame.bind(planned)
+    frame.gpu.draw(
+        planned,
+        {"vertex": "surface/surface_vert.glsl", "fragment": "passes/translucent_frag.glsl"},
+        CAMERA,
+        np.ascontiguousarray(frame.view["clip_from_world"]),
+        full=True,
+        only="transmissive",
+        units=len(planned.texture_reads()),
+        defines={
+            "SURFACE_TABLES": int(planned.has("brdf.albedo")), "SURFACE_SEE_THROUGH_GLASS": 1,
+            "SURFACE_SEEN_BY_CAMERA": 1, "SURFACE_SEEN_BY_SHADOW": 0,
+            "TINT_ONLY": int(planned.has("gbuffer.transmission")),
+        },
+    )  # fmt: skip
 
 
 class GBufferMips(Pass):

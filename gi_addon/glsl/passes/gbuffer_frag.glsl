@@ -43,6 +43,11 @@ void main()
 #if HAS_GBUF_LOBE
     gbuf_lobe = vec4(lobe.eta, lobe.f90 * gain, lobe.multiscatter, 0.0);
 #endif
+#if HAS_GBUF_SUBSURFACE
+    float scattered = luminance(c.subsurface);
+    gbuf_subsurface = vec4(scattered > 0.0 ? c.subsurface_radius / scattered : vec3(0.0),
+                           scattered / max(luminance(c.diffuse), 1e-6));
+#endif
 #if HAS_GBUF_EMISSION
     gbuf_emission = vec4(c.emission * gain, 1.0);
 #endif

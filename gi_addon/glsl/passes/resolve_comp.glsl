@@ -59,21 +59,32 @@ void main()
 #if HAS_INDIRECT_GLOSSY
         glossy_indirect = texelFetch(indirect_glossy, pixel, 0).rgb;
 #endif
-#if HAS_GBUF_TRANSMISSION
-        through_color = texelFetch(gbuf_transmission, pixel, 0).rgb;
-#endif
-#if HAS_TRANSMISSION_DIRECT
-        through_direct = texelFetch(transmission_direct, pixel, 0).rgb;
-#endif
-#if HAS_TRANSMISSION_INDIRECT
-        through_indirect = texelFetch(transmission_indirect, pixel, 0).rgb;
-#endif
 #if HAS_GBUF_EMISSION
         emission = texelFetch(gbuf_emission, pixel, 0).rgb;
 #endif
     } else if (view.film_transparent < 0.5) {
         environment = world_radiance(normalize(ray_direction_ws(uv)));
     }
+#if HAS_GBUF_TRANSMISSION
+    // Behind a refracting surface everything belongs to Transmission: what the technique found along the refracted ray, or
+    // what lies straight behind. Direct is what shines by itself (Cycles counts one refraction, then the light).
+    through_color = texelFetch(gbuf_transmission, pixel, 0).rgb;
+    if (any(notEqual(through_color, vec3(1.0)))) {
+        through_direct = (emission + environment) * through_color;
+        through_indirect = (diffuse_direct + diffuse_indirect + glossy_direct + glossy_indirect) * through_color;
+#if HAS_TRANSMISSION_INDIRECT
+        vec4 refracted = texelFetch(transmission_indirect, pixel, 0);
+        if (refracted.a > 0.0) {
+            through_indirect = refracted.rgb;
+            through_direct = vec3(0.0);
+        }
+#endif
+        diffuse_color = diffuse_direct = diffuse_indirect = glossy_direct = glossy_indirect = vec3(0.0);
+        emission = environment = vec3(0.0);
+    } else {
+        through_color = vec3(0.0);
+    }
+#endif
 #if HAS_VOLUME_LIGHT
     // What is behind a medium arrives dimmed, in every pass, as in Cycles.
     vec4 medium = texelFetch(volume_light, pixel, 0);
