@@ -442,8 +442,9 @@ def build_rig(
     def own_shadow_map(source: Source) -> bool:
         if not shadows or (source.light is not None and not source.light.use_shadow):
             return False
-        # What is drawn anew in each sub-frame anyway, at the very point that direct light comes from, is drawn once.
-        return not (bounces and source.kind in (LIGHT_AREA, LIGHT_MESH))
+        # What is drawn anew in each sub-frame anyway, at the very point that direct light comes from, is drawn once if
+        # it is fine enough.
+        return not (bounces and source.kind in (LIGHT_AREA, LIGHT_MESH) and bounce_resolution >= shadow_resolution)
 
     return LightRig(
         sources, bounds, world, emitters,
