@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A frame as a job: cancelled on the way, and scenes that nobody made for the tests."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gi_addon.compare import scenes
+from gi_addon.gl import CancelToken
+from gi_addon.gl.errors import Cancelled
+from gi_addon.renderer import Renderer, render
+from gi_addon.settings import Settings
+
+
+def test_a_cancelled_frame_stops_after_the_subframe_and_the_renderer_stays_usable(gl):
+    settings = Settings()
+    settings.samples = 64
+    token, seen = CancelToken(), []
+
+    def progress(share: float, text: str) -> None:
+        seen.append(share)
+        if len(seen) == 2:
+            token.cancel()
+
+    def job(g):
+        renderer = Renderer(g)
+        try:
+            with pytest.raises(Cancelled):
+                renderer.render(
+                    scenes.cornell(), settings, ("Combined",), resolution=(48, 27), progress=progress, cancel=token
+                )
+            settings.samples = 2
+            return renderer.render(scenes.cornell(), settings, ("Combined",), resolution=(48, 27)).passes["Combined"]
+        finally:
+            renderer.close()
+
+    after = gl(job)
+    assert len(seen) == 2
+    fresh = render(scenes.cornell(), settings, ("Combined",), resolution=(48, 27)).passes["Combined"]
+    np.testing.assert_array_equal(after, fresh)
+
+
+@pytest.mark.blender
+@pytest.mark.parametrize("name", ["sponza/sponza_crytek", "living_room_bitterli/living_room"])
+def test_real_scenes_render_finite_and_lit(blender, gl, shared_scenes, name):
+    path = shared_scenes / f"{name}.blend"
+    if not path.is_file():
+        pytest.skip(f"{path.name} is not here")
+    from gi_addon.host import files
+    from gi_addon.host.cycles import render_passes
+
+    scene, _ = files.load(path)
+    scene.render.engine = "QUARTET"
+    scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 96, 54, 100
+    scene.quartet.samples = 1
+    for image in render_passes(scene, ("Combined", "Diffuse Indirect")).values():
+        assert np.isfinite(image).all()
+        assert (image[..., :3].max(axis=-1) > 1e-4).mean() > 0.5
+    blender.ops.wm.read_factory_settings(use_empty=True)
