@@ -120,6 +120,20 @@ class RSMSettings:
 
 
 @dataclass
+class VCTSettings:
+    """Voxel cone tracing (Crassin et al. 2011)."""
+
+    resolution: int = _setting(
+        64, "Resolution", "Cells along the longest side of the voxel grid", low=16, high=512,
+        higher="thinner walls hold, finer bounce light", lower="faster, less memory",
+    )  # fmt: skip
+    continuous_voxelization: bool = _setting(
+        False, "Continuous Voxelization", "Voxelize in every sub-frame, as the paper's Table 2 has it; else only when a "
+        "mesh, a transform or a material has changed. Light is always injected anew when it changes",
+    )  # fmt: skip
+
+
+@dataclass
 class Settings:
     """All of ``scene.quartet``."""
 
@@ -160,6 +174,7 @@ class Settings:
     ao: AOSettings = _group(AOSettings)
     world: WorldSettings = _group(WorldSettings)
     rsm: RSMSettings = _group(RSMSettings)
+    vct: VCTSettings = _group(VCTSettings)
 
     # -- access by dotted name ---------------------------------------------------------------------------------
 
