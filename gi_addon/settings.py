@@ -52,7 +52,10 @@ def _group(cls: type) -> Any:
     return field(default_factory=cls)
 
 
-TECHNIQUES = (("RSM", "Reflective Shadow Maps", "One bounce gathered from virtual point lights on what the lights see"),)
+TECHNIQUES = (
+    ("RSM", "Reflective Shadow Maps", "One bounce gathered from virtual point lights on what the lights see"),
+    ("VCT", "Voxel Cone Tracing", "Bounces gathered by cones through a grid of lit cells"),
+)
 
 
 @dataclass
@@ -126,6 +129,10 @@ class VCTSettings:
     resolution: int = _setting(
         64, "Resolution", "Cells along the longest side of the voxel grid", low=16, high=512,
         higher="thinner walls hold, finer bounce light", lower="faster, less memory",
+    )  # fmt: skip
+    cones: int = _setting(
+        6, "Cones", "Cones traced from each point into its hemisphere and sub-frame", low=1, high=64,
+        higher="finer directions, sharper contact", lower="faster, blurrier",
     )  # fmt: skip
     continuous_voxelization: bool = _setting(
         False, "Continuous Voxelization", "Voxelize in every sub-frame, as the paper's Table 2 has it; else only when a "

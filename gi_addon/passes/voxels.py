@@ -94,8 +94,8 @@ class Voxelisation(Pass):
                 "mean opacity of the surfaces, 0 in empty cells", "rgba16f", _size),
         Texture("voxels.albedo", "voxel_albedo", "mean share of light that the surfaces reflect; 1 where there are any",
                 "rgba8", _size),
-        Texture("voxels.normal", "voxel_normal", "mean normal of their fronts, world space; shorter than 1 where they "
-                "differ", "rgba16f", _size),
+        Texture("voxels.normal", "voxel_normal", "Σ area × opacity × normal of their fronts, world space, in cell faces: "
+                "shorter than the area where they face apart", "rgba16f", _size),
         Texture("voxels.emission", "voxel_emission", "mean emitted radiance, W/(m²·sr)", "rgba16f", _size,
                 when=lambda f: None if f.emissive else "no visible material emits"),
         Buffer("voxels.sums", "voxel_sums", "fixed-point sums of the layers in the making", "uint", np.dtype("u4"),

@@ -25,7 +25,7 @@ void main()
 #endif
 #if HAS_VOXEL_NORMAL
     vec3 normal = vec3(ivec3(uvec3(voxel_sums[first + 8u], voxel_sums[first + 9u], voxel_sums[first + 10u])));
-    imageStore(voxel_normal, cell, vec4(normal * inverse, 0.0));
+    imageStore(voxel_normal, cell, vec4(normal / float(VOXEL_UNITS), 0.0));
 #endif
 #if HAS_VOXEL_EMISSION
     vec3 emission = vec3(voxel_sums[first + 11u], voxel_sums[first + 12u], voxel_sums[first + 13u]);

@@ -112,13 +112,13 @@ void main()
         add(at + 2u, weight * albedo.r);
         add(at + 3u, weight * albedo.g);
         add(at + 4u, weight * albedo.b);
-        vec3 projected = facing * (seen / along * float(VOXEL_UNITS) * opacity);
-        add(at + 5u, projected.x);
-        add(at + 6u, projected.y);
-        add(at + 7u, projected.z);
-        add(at + 8u, weight * front.x);
-        add(at + 9u, weight * front.y);
-        add(at + 10u, weight * front.z);
+        vec3 vector = front * (seen / along * float(VOXEL_UNITS) * opacity);
+        add(at + 5u, abs(vector.x));
+        add(at + 6u, abs(vector.y));
+        add(at + 7u, abs(vector.z));
+        add(at + 8u, vector.x);
+        add(at + 9u, vector.y);
+        add(at + 10u, vector.z);
 #if VOXEL_EMISSION
         float scale = weight / (float(VOXEL_UNITS) * emission_unit);
         add(at + 11u, c.emission.r * scale);

@@ -1,0 +1,222 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Voxel cone tracing, Figure 4c of the paper.
+
+C. Crassin, F. Neyret, M. Sainz, S. Green and E. Eisemann, "Interactive Indirect Illumination Using Voxel Cone Tracing",
+Pacific Graphics 2011. The scene becomes a grid of cells that know what they block and what light leaves them, by
+direction; whatever a surface needs to know of the rest of the scene is gathered by cones through that grid.
+"""
+
+from __future__ import annotations
+
+from ..facts import Facts
+from ..frame import Frame
+from ..graph import Optional, Pass, Planned, Texture, Uniform
+from ..passes.ao import AOBlur, AOGeneration
+from ..passes.brdf_tables import BRDFTables
+from ..passes.direct_lighting import DirectLighting
+from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentTint, _screen, gather_size
+from ..passes.lights import LightList, RSMGeneration, ShadowMaps
+from ..passes.resolve import Resolve
+from ..passes.voxels import GRID_UNIFORMS, Voxelisation, voxel_grid
+from ..settings import Settings
+
+_FULLSCREEN = "passes/fullscreen_vert.glsl"
+
+
+def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
+    """Figure 4c, in order."""
+    return [
+        BRDFTables(),
+        LightList(),
+        ShadowMaps(),
+        RSMGeneration(),
+        Voxelisation(),
+        VoxelCoverage(),
+        RadianceInjection(),
+        GBuffer(),
+        TranslucentTint(),
+        GBufferMips(),
+        AOGeneration(),
+        AOBlur(),
+        InterpolatedIndirect(),
+        IndirectLighting(),
+        DirectLighting(),
+        Resolve(layers),
+    ]
+
+
+def _bounce_off(facts: Facts) -> str | None:
+    if not facts.settings.use_indirect_diffuse:
+        return "indirect diffuse is switched off"
+    if facts.settings.bounces == 0:
+        return "bounces is 0"
+    return None if facts.lit else "no light shines"
+
+
+def _atlas(facts: Facts) -> tuple[int, int, int]:
+    """Six parts, two sides by three axes."""
+    x, y, z = voxel_grid(facts).size
+    return (2 * x, y, 3 * z)
+
+
+class VoxelCoverage(Pass):
+    """How much of a cell's faces its surfaces cover, and which way they face, at every mip."""
+
+    title = "Voxel Coverage"
+    reads = ("voxels.area", "voxels.normal")
+    writes = (
+        Texture("vct.coverage", "voxel_coverage", "share of a cell face that opaque surfaces cover, along x, y, z",
+                "rgba16f", lambda f: voxel_grid(f).size, mips=lambda f: voxel_grid(f).levels, scratch=True),
+        Texture("vct.facing", "voxel_facing", "which way fronts face, −1 … 1 along x, y, z: 0 where they face apart",
+                "rgba16f", lambda f: voxel_grid(f).size, mips=lambda f: voxel_grid(f).levels, filter="linear",
+                scratch=True),
+    )  # fmt: skip
+    uniforms = (Uniform("size", "ivec3", "cells of the level that is made"),)
+    shaders = {
+        "main": {"compute": "engines/vct/coverage_comp.glsl"},
+        "mips": {"compute": "engines/vct/coverage_mips_comp.glsl"},
+    }
+    depends = Voxelisation.depends
+    settings = Voxelisation.settings
+
+    def rate(self, facts: Facts) -> str:
+        return Voxelisation().rate(facts)
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        grid = voxel_grid(planned.facts)
+        program = frame.program(planned)
+        frame.set(program, size=grid.size)
+        frame.compute(planned, program, grid.size, (4, 4, 4))
+        program = frame.program(planned, "mips")
+        volumes = [frame.resources[name] for name in ("vct.coverage", "vct.facing")]
+        size = grid.size
+        for level in range(grid.levels):
+            size = tuple(n // 2 for n in size)
+            for k, volume in enumerate(volumes):
+                volume.bind_to_image(2 + 2 * k, read=True, write=False, level=level)
+                volume.bind_to_image(3 + 2 * k, read=False, write=True, level=level + 1)
+            frame.set(program, size=size)
+            program.run(*(-(-n // 4) for n in size))
+            frame.gl.ctx.memory_barrier()
+
+
+class RadianceInjection(Pass):
+    """Light that leaves the cells, and the directional mips of it."""
+
+    title = "Voxel Radiance Injection"
+    figure = "Voxel Radiance Injection, Voxel Anisotropic Mipmap Generation"
+    reads = (
+        "vct.coverage", "voxels.albedo", Optional("voxels.emission"), Optional("rsm.depth"), Optional("rsm.albedo"),
+        Optional("rsm.normal"), Optional("rsm.lights"), Optional("rsm.views"),
+    )  # fmt: skip
+    writes = (
+        Texture("vct.radiance", "voxel_radiance", "by side and axis: radiance × alpha, W/(m²·sr); alpha, optical depth of "
+                "crossing the cell / 8", "rgba16f", _atlas, mips=lambda f: voxel_grid(f).levels, filter="linear"),
+    )  # fmt: skip
+    uniforms = (
+        *GRID_UNIFORMS,
+        Uniform("view_count", "int", "reflective shadow maps in the list"),
+        Uniform("first_time", "int", "1 when empty cells are due too"),
+    )
+    shaders = {
+        "main": {"compute": "engines/vct/inject_comp.glsl"},
+        "mips": {"compute": "engines/vct/mips_comp.glsl"},
+    }
+    depends = ("lights", "world", "transforms", "meshes", "materials")
+    settings = ("vct.resolution",)
+
+    def rate(self, facts: Facts) -> str:
+        return RSMGeneration().rate(facts) if facts.rig.bounce.sizes else "static"
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        grid = voxel_grid(planned.facts)
+        program = frame.program(planned)
+        frame.set(
+            program, view_count=len(planned.facts.rig.bounce.sizes), first_time=int(planned.stale), **grid.uniforms()
+        )
+        frame.compute(planned, program, grid.size, (4, 4, 4))
+        build_mips(frame, planned, frame.resources["vct.radiance"], grid.size, grid.levels)
+
+
+def build_mips(frame: Frame, planned: Planned, atlas, size: tuple[int, int, int], levels: int) -> None:
+    """The levels of a directional atlas above its cells."""
+    program = frame.program(planned, "mips")
+    for level in range(levels):
+        size = tuple(n // 2 for n in size)
+        atlas.bind_to_image(1, read=True, write=False, level=level)
+        atlas.bind_to_image(2, read=False, write=True, level=level + 1)
+        frame.set(program, coarse_size=size, coarse_level=level + 1)
+        program.run(*(-(-n // 4) for n in size))
+        frame.gl.ctx.memory_barrier()
+
+
+_CONE_UNIFORMS = (
+    *GRID_UNIFORMS,
+    Uniform("grid_levels", "float", "mips above the cells"),
+    Uniform("cone_count", "int", "cones per point and sub-frame"),
+    Uniform("cone_sharpness", "float", "how many sets of cones share the hemisphere"),
+)
+
+
+def _set_cones(frame: Frame, program, facts: Facts) -> None:
+    grid = voxel_grid(facts)
+    frame.set(
+        program, **grid.uniforms(), grid_levels=float(grid.levels), cone_count=facts.settings.vct.cones,
+        cone_sharpness=1.0,
+    )  # fmt: skip
+
+
+class InterpolatedIndirect(Pass):
+    """Indirect light at one pixel per block."""
+
+    title = "Voxel Interpolated Indirect Lighting Computation"
+    reads = ("vct.radiance", "vct.facing", "gbuffer.low_depth", "gbuffer.low_normal", "gbuffer.low_pixel")
+    writes = (
+        Texture("indirect.low", "low_indirect", "radiance a white Lambert surface would reflect, W/(m²·sr)", "rgba32f",
+                gather_size, scratch=True),
+        Texture("indirect.low_direction", "low_direction", "Σ luminance × direction, and Σ luminance, of what arrives",
+                "rgba32f", gather_size, scratch=True),
+    )  # fmt: skip
+    uniforms = _CONE_UNIFORMS
+    shaders = {"main": {"vertex": _FULLSCREEN, "fragment": "engines/vct/gather_low_frag.glsl"}}
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return {"GATHER_SCALE": facts.settings.gather_scale}
+
+    def absent(self, facts: Facts) -> str | None:
+        if facts.settings.gather_scale == 1:
+            return "every pixel gathers for itself"
+        return _bounce_off(facts)
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        program = frame.program(planned)
+        _set_cones(frame, program, planned.facts)
+        frame.screen(planned, program)
+
+
+class IndirectLighting(Pass):
+    """Indirect light of every pixel: interpolated where the low resolution has its surface, by cones where not."""
+
+    title = "Voxel Lighting Computation"
+    figure = "Voxel Lighting Computation"
+    reads = (
+        "vct.radiance", "vct.facing", "gbuffer.depth", "gbuffer.normal", Optional("gbuffer.low_depth"), Optional("gbuffer.low_normal"),
+        Optional("gbuffer.low_pixel"), Optional("indirect.low"), Optional("indirect.low_direction"),
+    )  # fmt: skip
+    writes = (
+        Texture("indirect.diffuse", "indirect_diffuse", "radiance a white Lambert surface would reflect, W/(m²·sr)",
+                "rgba32f", _screen, when=lambda f: None if f.diffuse else "no visible material is diffuse"),
+    )  # fmt: skip
+    uniforms = _CONE_UNIFORMS
+    shaders = {"main": {"vertex": _FULLSCREEN, "fragment": "engines/vct/lighting_frag.glsl"}}
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return {"GATHER_SCALE": facts.settings.gather_scale}
+
+    def absent(self, facts: Facts) -> str | None:
+        return _bounce_off(facts)
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        program = frame.program(planned)
+        _set_cones(frame, program, planned.facts)
+        frame.screen(planned, program)

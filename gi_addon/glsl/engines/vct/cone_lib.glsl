@@ -1,0 +1,51 @@
+// A cone through the voxels: C. Crassin et al., "Interactive Indirect Illumination Using Voxel Cone Tracing", Pacific
+// Graphics 2011; paper §IV-D. Radiance front to back, dL = T (1 − e^−τ) S, T ← T e^−τ, at the mip as wide as the cone.
+
+#include "engines/vct/volume_lib.glsl"
+
+struct ConeResult {
+    vec3 radiance;        // that arrives along the cone, W/(m²·sr)
+    float transmittance;  // share of the cone that nothing blocks
+};
+
+// Below this nothing behind changes a picture: 1/1000.
+const float CONE_END = 1e-3;
+const int CONE_MOST_STEPS = 512;
+
+// A surface in the grid reaches as far from its plane as half a cell (it may lie anywhere in it) and the one cell that
+// interpolation spreads it, measured along the axes: 1.5 (|n_x| + |n_y| + |n_z|) cells.
+float surface_reach(vec3 n) { return 1.5 * (abs(n.x) + abs(n.y) + abs(n.z)); }
+
+// `start` in cells, `direction` a unit vector, `spread` the tangent of the cone's half angle, `apex` how far behind
+// `start` its tip lies, `reach` how far it goes, in cells. Over a receiver of normal `n` (0 for none) that lies `above` cells
+// below the start, mips are kept so fine that they don't reach back down to it. `phase` in [0, 1) shifts the first step.
+ConeResult trace_cone(sampler3D atlas, sampler3D facing, Grid grid, vec3 start, vec3 direction, float spread, float apex, float reach,
+                      vec3 n, float above, float phase)
+{
+    ConeResult result = ConeResult(vec3(0.0), 1.0);
+    // Leaves the grid here.
+    vec3 inverse = 1.0 / mix(direction, vec3(1e-9), lessThan(abs(direction), vec3(1e-9)));
+    vec3 far = max(-start * inverse, (grid.size - start) * inverse);
+    float end = min(min(far.x, min(far.y, far.z)), reach);
+    float climb = dot(direction, n);
+    float span = surface_reach(n);
+    float t = 0.0;
+    for (int i = 0; i < CONE_MOST_STEPS; ++i) {
+        if (t >= end || result.transmittance < CONE_END) {
+            break;
+        }
+        float width = 2.0 * spread * (t + apex);
+        if (span > 0.0) {
+            width = min(width, (above + t * climb) / span);
+        }
+        float lod = clamp(log2(width), 0.0, grid.levels);
+        float size = exp2(lod);
+        float step_ = min(i == 0 ? size * (1.0 - phase) : size, end - t);
+        vec4 medium = medium_at(atlas, facing, grid, start + direction * (t + 0.5 * step_), direction, lod);
+        float through = exp(-medium.a * step_ / size);
+        result.radiance += result.transmittance * (1.0 - through) * medium.rgb;
+        result.transmittance *= through;
+        t += step_;
+    }
+    return result;
+}
