@@ -17,7 +17,7 @@ from ..passes.direct_lighting import DirectLighting
 from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentTint, _screen, gather_size
 from ..passes.lights import LightList, RSMGeneration, ShadowMaps
 from ..passes.resolve import Resolve
-from ..passes.voxels import GRID_UNIFORMS, Voxelisation, voxel_grid
+from ..passes.voxels import GRID_UNIFORMS, VoxelGrid, Voxelisation, voxel_grid
 from ..settings import Settings
 
 _FULLSCREEN = "passes/fullscreen_vert.glsl"
@@ -68,13 +68,18 @@ class VoxelCoverage(Pass):
         Texture("vct.coverage", "voxel_coverage", "share of a cell face that opaque surfaces cover, along x, y, z",
                 "rgba16f", lambda f: voxel_grid(f).size, mips=lambda f: voxel_grid(f).levels, scratch=True),
         Texture("vct.facing", "voxel_facing", "which way fronts face, −1 … 1 along x, y, z: 0 where they face apart",
-                "rgba16f", lambda f: voxel_grid(f).size, mips=lambda f: voxel_grid(f).levels, filter="linear",
-                scratch=True),
+                "rgba16f", lambda f: voxel_grid(f).size, mips=lambda f: voxel_grid(f).levels, scratch=True),
+        Texture("vct.opacity", "voxel_opacity", "optical depth of crossing the cell along x, y, z, over 8", "rgba16f",
+                lambda f: voxel_grid(f).size, mips=lambda f: voxel_grid(f).levels, filter="linear", scratch=True),
     )  # fmt: skip
-    uniforms = (Uniform("size", "ivec3", "cells of the level that is made"),)
+    uniforms = (
+        Uniform("size", "ivec3", "cells of the level that is made"),
+        Uniform("level", "int", "which level that is"),
+    )
     shaders = {
         "main": {"compute": "engines/vct/coverage_comp.glsl"},
         "mips": {"compute": "engines/vct/coverage_mips_comp.glsl"},
+        "opacity": {"compute": "engines/vct/opacity_comp.glsl"},
     }
     depends = Voxelisation.depends
     settings = Voxelisation.settings
@@ -88,16 +93,25 @@ class VoxelCoverage(Pass):
         frame.set(program, size=grid.size)
         frame.compute(planned, program, grid.size, (4, 4, 4))
         program = frame.program(planned, "mips")
-        volumes = [frame.resources[name] for name in ("vct.coverage", "vct.facing")]
+        coverage, facing, opacity = (frame.resources[f"vct.{name}"] for name in ("coverage", "facing", "opacity"))
         size = grid.size
         for level in range(grid.levels):
             size = tuple(n // 2 for n in size)
-            for k, volume in enumerate(volumes):
-                volume.bind_to_image(2 + 2 * k, read=True, write=False, level=level)
-                volume.bind_to_image(3 + 2 * k, read=False, write=True, level=level + 1)
+            for k, volume in enumerate((coverage, facing)):
+                volume.bind_to_image(3 + 2 * k, read=True, write=False, level=level)
+                volume.bind_to_image(4 + 2 * k, read=False, write=True, level=level + 1)
             frame.set(program, size=size)
             program.run(*(-(-n // 4) for n in size))
             frame.gl.ctx.memory_barrier()
+        program = frame.program(planned, "opacity")
+        coverage.use(2)
+        size = grid.size
+        for level in range(grid.levels + 1):
+            opacity.bind_to_image(3, read=False, write=True, level=level)
+            frame.set(program, size=size, level=level)
+            program.run(*(-(-n // 4) for n in size))
+            size = tuple(n // 2 for n in size)
+        frame.gl.ctx.memory_barrier()
 
 
 class RadianceInjection(Pass):
@@ -106,12 +120,16 @@ class RadianceInjection(Pass):
     title = "Voxel Radiance Injection"
     figure = "Voxel Radiance Injection, Voxel Anisotropic Mipmap Generation"
     reads = (
-        "vct.coverage", "voxels.albedo", Optional("voxels.emission"), Optional("rsm.depth"), Optional("rsm.albedo"),
+        "vct.coverage", "vct.facing", "vct.opacity", "voxels.albedo", Optional("voxels.emission"), Optional("rsm.depth"), Optional("rsm.albedo"),
         Optional("rsm.normal"), Optional("rsm.lights"), Optional("rsm.views"),
     )  # fmt: skip
     writes = (
-        Texture("vct.radiance", "voxel_radiance", "by side and axis: radiance × alpha, W/(m²·sr); alpha, optical depth of "
-                "crossing the cell / 8", "rgba16f", _atlas, mips=lambda f: voxel_grid(f).levels, filter="linear"),
+        Texture("vct.radiance", "voxel_radiance", "by side and axis: radiance × alpha, W/(m²·sr), of surfaces whose fronts "
+                "face that way; alpha, their share of vct.opacity", "rgba16f", _atlas, mips=lambda f: voxel_grid(f).levels,
+                filter="linear", scratch=True),
+        Texture("vct.back", "voxel_back", "radiance × alpha, W/(m²·sr), that leaves surfaces by their backs; alpha, the sum of "
+                "vct.opacity", "rgba16f", lambda f: voxel_grid(f).size, mips=lambda f: voxel_grid(f).levels,
+                filter="linear", scratch=True),
     )  # fmt: skip
     uniforms = (
         *GRID_UNIFORMS,
@@ -135,16 +153,18 @@ class RadianceInjection(Pass):
             program, view_count=len(planned.facts.rig.bounce.sizes), first_time=int(planned.stale), **grid.uniforms()
         )
         frame.compute(planned, program, grid.size, (4, 4, 4))
-        build_mips(frame, planned, frame.resources["vct.radiance"], grid.size, grid.levels)
+        build_mips(frame, planned, grid)
 
 
-def build_mips(frame: Frame, planned: Planned, atlas, size: tuple[int, int, int], levels: int) -> None:
-    """The levels of a directional atlas above its cells."""
+def build_mips(frame: Frame, planned: Planned, grid: VoxelGrid) -> None:
+    """The levels of the light volumes above their cells."""
     program = frame.program(planned, "mips")
-    for level in range(levels):
+    size = grid.size
+    for level in range(grid.levels):
         size = tuple(n // 2 for n in size)
-        atlas.bind_to_image(1, read=True, write=False, level=level)
-        atlas.bind_to_image(2, read=False, write=True, level=level + 1)
+        for k, name in enumerate(("vct.radiance", "vct.back")):
+            frame.resources[name].bind_to_image(2 + 2 * k, read=True, write=False, level=level)
+            frame.resources[name].bind_to_image(3 + 2 * k, read=False, write=True, level=level + 1)
         frame.set(program, coarse_size=size, coarse_level=level + 1)
         program.run(*(-(-n // 4) for n in size))
         frame.gl.ctx.memory_barrier()
@@ -162,7 +182,7 @@ def _set_cones(frame: Frame, program, facts: Facts) -> None:
     grid = voxel_grid(facts)
     frame.set(
         program, **grid.uniforms(), grid_levels=float(grid.levels), cone_count=facts.settings.vct.cones,
-        cone_sharpness=1.0,
+        cone_sharpness=float(facts.subframes),
     )  # fmt: skip
 
 
@@ -170,7 +190,7 @@ class InterpolatedIndirect(Pass):
     """Indirect light at one pixel per block."""
 
     title = "Voxel Interpolated Indirect Lighting Computation"
-    reads = ("vct.radiance", "vct.facing", "gbuffer.low_depth", "gbuffer.low_normal", "gbuffer.low_pixel")
+    reads = ("vct.radiance", "vct.back", "vct.opacity", "gbuffer.low_depth", "gbuffer.low_normal", "gbuffer.low_pixel")
     writes = (
         Texture("indirect.low", "low_indirect", "radiance a white Lambert surface would reflect, W/(m²·sr)", "rgba32f",
                 gather_size, scratch=True),
@@ -200,7 +220,7 @@ class IndirectLighting(Pass):
     title = "Voxel Lighting Computation"
     figure = "Voxel Lighting Computation"
     reads = (
-        "vct.radiance", "vct.facing", "gbuffer.depth", "gbuffer.normal", Optional("gbuffer.low_depth"), Optional("gbuffer.low_normal"),
+        "vct.radiance", "vct.back", "vct.opacity", "gbuffer.depth", "gbuffer.normal", Optional("gbuffer.low_depth"), Optional("gbuffer.low_normal"),
         Optional("gbuffer.low_pixel"), Optional("indirect.low"), Optional("indirect.low_direction"),
     )  # fmt: skip
     writes = (

@@ -16,10 +16,18 @@ const int CONE_MOST_STEPS = 512;
 // interpolation spreads it, measured along the axes: 1.5 (|n_x| + |n_y| + |n_z|) cells.
 float surface_reach(vec3 n) { return 1.5 * (abs(n.x) + abs(n.y) + abs(n.z)); }
 
+// An interpolated wall is met before its middle: its depth gathers as 8 x²/2 over the first of the two cells that it is
+// spread to, and a ray ends at the mean ∫ exp(−4 x²) dx = √π/4 of that, 1 − √π/4 cells early. So rays look that far back.
+const float EARLY = 0.557;
+
+// A start may lie within the blur of a wall beside it; leaving that, a cone sees its back, which stops nothing yet.
+// Measured on an empty Cornell box (docs/techniques/vct.md): relMSE .0144 without, .0129 with 2 … 4 cells.
+const float LEAVING = 4.0;
+
 // `start` in cells, `direction` a unit vector, `spread` the tangent of the cone's half angle, `apex` how far behind
 // `start` its tip lies, `reach` how far it goes, in cells. Over a receiver of normal `n` (0 for none) that lies `above` cells
 // below the start, mips are kept so fine that they don't reach back down to it. `phase` in [0, 1) shifts the first step.
-ConeResult trace_cone(sampler3D atlas, sampler3D facing, Grid grid, vec3 start, vec3 direction, float spread, float apex, float reach,
+ConeResult trace_cone(sampler3D atlas, sampler3D back, sampler3D opacity, Grid grid, vec3 start, vec3 direction, float spread, float apex, float reach,
                       vec3 n, float above, float phase)
 {
     ConeResult result = ConeResult(vec3(0.0), 1.0);
@@ -31,17 +39,19 @@ ConeResult trace_cone(sampler3D atlas, sampler3D facing, Grid grid, vec3 start, 
     float span = surface_reach(n);
     float t = 0.0;
     for (int i = 0; i < CONE_MOST_STEPS; ++i) {
-        if (t >= end || result.transmittance < CONE_END) {
-            break;
-        }
-        float width = 2.0 * spread * (t + apex);
+        // A disc of diameter D varies by D/4 a side; a cell of width s, blended with its neighbours, by s/2. So s = D/2.
+        float width = spread * (t + apex);
         if (span > 0.0) {
             width = min(width, (above + t * climb) / span);
         }
         float lod = clamp(log2(width), 0.0, grid.levels);
         float size = exp2(lod);
-        float step_ = min(i == 0 ? size * (1.0 - phase) : size, end - t);
-        vec4 medium = medium_at(atlas, facing, grid, start + direction * (t + 0.5 * step_), direction, lod);
+        if (t >= end + EARLY * size || result.transmittance < CONE_END) {
+            break;
+        }
+        float step_ = i == 0 ? size * (1.0 - phase) : size;
+        float at = max(t + 0.5 * step_ - EARLY * size, 0.0);
+        vec4 medium = medium_at(atlas, back, opacity, grid, start + direction * at, direction, lod, t < LEAVING * size);
         float through = exp(-medium.a * step_ / size);
         result.radiance += result.transmittance * (1.0 - through) * medium.rgb;
         result.transmittance *= through;

@@ -2,10 +2,10 @@
 // columns side by side are averaged. Facing is averaged by coverage.
 
 layout(local_size_x = 4, local_size_y = 4, local_size_z = 4) in;
-layout(binding = 2, rgba16f) readonly uniform image3D finer_coverage;
-layout(binding = 3, rgba16f) writeonly uniform image3D coarser_coverage;
-layout(binding = 4, rgba16f) readonly uniform image3D finer_facing;
-layout(binding = 5, rgba16f) writeonly uniform image3D coarser_facing;
+layout(binding = 3, rgba16f) readonly uniform image3D finer_coverage;
+layout(binding = 4, rgba16f) writeonly uniform image3D coarser_coverage;
+layout(binding = 5, rgba16f) readonly uniform image3D finer_facing;
+layout(binding = 6, rgba16f) writeonly uniform image3D coarser_facing;
 
 void main()
 {

@@ -37,8 +37,8 @@ Gathered gather_cones(vec3 position_ws, vec3 n, vec3 ng, float reach, int count)
         if (dot(d, ng) <= 0.0) {
             continue; // into the triangle
         }
-        ConeResult cone = trace_cone(voxel_radiance, voxel_facing, grid, start, d, spread, above, reach / grid.cell,
-                                     ng, above, phase);
+        ConeResult cone = trace_cone(voxel_radiance, voxel_back, voxel_opacity, grid, start, d, spread, above,
+                                     reach / grid.cell, ng, above, phase);
         g.radiance += cone.radiance;
         g.open_ += cone.transmittance;
         g.direction += vec4(d, 1.0) * (luminance(cone.radiance) / max(sqrt(1.0 - r2), sin_half));

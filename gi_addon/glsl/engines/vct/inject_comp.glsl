@@ -34,6 +34,7 @@ void main()
     if (empty && first_time == 0) {
         return; // as it was
     }
+    vec3 back = vec3(0.0);
     vec3 leaving[6];
     for (int f = 0; f < 6; ++f) {
         leaving[f] = vec3(0.0);
@@ -48,6 +49,10 @@ void main()
             sum[f] = vec3(0.0);
             weight[f] = 0.0;
         }
+        vec4 back_sum = vec4(0.0);
+        // The cell's fronts as a vector over the area they could have at most; −1 … 1 against a normal.
+        vec3 coverage = texelFetch(voxel_coverage, cell, 0).rgb;
+        vec3 fronts = texelFetch(voxel_facing, cell, 0).rgb * coverage;
         float inside = 0.0;  // rays that end here
         float open_ = 0.0;   // rays that pass
         float beside = 0.0;  // rays that end near by
@@ -84,10 +89,17 @@ void main()
                 beside += here ? 0.0 : 1.0;
                 float w = here ? 1.0 : NEAR_BY_WEIGHT;
                 vec3 radiance = t.flux / (t.area * PI);
-                for (int f = 0; f < 6; ++f) {
-                    float side = (f & 1) == 0 ? t.normal_ws[f >> 1] : -t.normal_ws[f >> 1];
-                    sum[f] += w * max(side, 0.0) * radiance;
-                    weight[f] += w * max(side, 0.0);
+                // A sheet's back is lit where all its fronts face away (−1); where surfaces face apart (0) it is some
+                // front that is lit.
+                float facing_light = dot(t.normal_ws, fronts) / max(dot(abs(t.normal_ws), coverage), 1e-6);
+                if (facing_light < -0.5) {
+                    back_sum += vec4(radiance, 1.0) * w;
+                } else {
+                    for (int f = 0; f < 6; ++f) {
+                        float side = (f & 1) == 0 ? t.normal_ws[f >> 1] : -t.normal_ws[f >> 1];
+                        sum[f] += w * max(side, 0.0) * radiance;
+                        weight[f] += w * max(side, 0.0);
+                    }
                 }
             }
             bool last = index + 1 == view_count || rsm_views[index + 1].light != v.light;
@@ -101,21 +113,28 @@ void main()
                     sum[f] = vec3(0.0);
                     weight[f] = 0.0;
                 }
+                back += back_sum.a > 0.0 ? back_sum.rgb / back_sum.a * share : vec3(0.0);
+                back_sum = vec4(0.0);
                 inside = open_ = beside = 0.0;
             }
         }
     }
 #endif
 #if HAS_VOXEL_EMISSION
+    vec3 emission = texelFetch(voxel_emission, cell, 0).rgb; // by both sides of a surface
+    back += emission;
     for (int f = 0; f < 6; ++f) {
-        leaving[f] += texelFetch(voxel_emission, cell, 0).rgb; // both sides of a surface emit
+        leaving[f] += emission;
     }
 #endif
-    vec3 alphas = empty ? vec3(0.0) : cell_alpha(voxel_coverage, cell, 0);
-    for (int axis = 0; axis < 3; ++axis) {
-        float alpha = alphas[axis];
-        for (int side = 0; side < 2; ++side) {
-            imageStore(voxel_radiance, part_texel(cell, grid_size, axis, side), vec4(leaving[2 * axis + side] * alpha, alpha));
-        }
+    vec3 alpha = texelFetch(voxel_opacity, cell, 0).rgb;
+    vec3 facing = texelFetch(voxel_facing, cell, 0).rgb;
+    for (int f = 0; f < 6; ++f) {
+        int axis = f >> 1;
+        int side = f & 1;
+        float front = alpha[axis] * (0.5 + (side == 0 ? 0.5 : -0.5) * facing[axis]);
+        imageStore(voxel_radiance, part_texel(cell, grid_size, axis, side), vec4(leaving[f] * front, front));
     }
+    float depth = alpha.x + alpha.y + alpha.z;
+    imageStore(voxel_back, cell, vec4(back * depth, depth));
 }

@@ -4,8 +4,10 @@
 #include "engines/vct/volume_lib.glsl"
 
 layout(local_size_x = 4, local_size_y = 4, local_size_z = 4) in;
-layout(binding = 1, rgba16f) readonly uniform image3D finer;
-layout(binding = 2, rgba16f) writeonly uniform image3D coarser;
+layout(binding = 2, rgba16f) readonly uniform image3D finer;
+layout(binding = 3, rgba16f) writeonly uniform image3D coarser;
+layout(binding = 4, rgba16f) readonly uniform image3D finer_back;
+layout(binding = 5, rgba16f) writeonly uniform image3D coarser_back;
 uniform ivec3 coarse_size;
 uniform int coarse_level;
 
@@ -16,7 +18,8 @@ void main()
         return;
     }
     ivec3 fine_size = 2 * coarse_size;
-    vec3 alpha = cell_alpha(voxel_coverage, cell, coarse_level);
+    int fine_level = coarse_level - 1;
+    vec3 alpha = texelFetch(voxel_opacity, cell, coarse_level).rgb;
     for (int part = 0; part < 6; ++part) {
         int axis = part >> 1;
         int side = part & 1;
@@ -26,18 +29,28 @@ void main()
         // The cell on the part's side is in front.
         ivec3 front = 2 * cell + along * (1 - side);
         ivec3 behind = 2 * cell + along * side;
-        vec3 light = vec3(0.0);
-        float weight = 0.0;
+        vec4 light = vec4(0.0);
+        float covered = 0.0;
         for (int column = 0; column < 4; ++column) {
             ivec3 across = u * (column & 1) + v * (column >> 1);
-            vec4 a = imageLoad(finer, part_texel(front + across, fine_size, axis, side));
-            vec4 b = imageLoad(finer, part_texel(behind + across, fine_size, axis, side));
-            float covers_a = texelFetch(voxel_coverage, front + across, coarse_level - 1)[axis];
-            float covers_b = min(texelFetch(voxel_coverage, behind + across, coarse_level - 1)[axis], 1.0 - covers_a);
-            light += safe_divide(a.rgb, vec3(a.a)) * covers_a + safe_divide(b.rgb, vec3(b.a)) * covers_b;
-            weight += covers_a + covers_b;
+            float left = 1.0;
+            for (int k = 0; k < 2; ++k) {
+                ivec3 at = (k == 0 ? front : behind) + across;
+                vec4 here = imageLoad(finer, part_texel(at, fine_size, axis, side));
+                float covers = min(texelFetch(voxel_coverage, at, fine_level)[axis], left);
+                float depth = texelFetch(voxel_opacity, at, fine_level)[axis];
+                light += depth > 0.0 ? here * (covers / depth) : vec4(0.0);
+                covered += covers;
+                left -= covers;
+            }
         }
-        vec3 color = weight > 0.0 ? light / weight * alpha[axis] : vec3(0.0);
-        imageStore(coarser, part_texel(cell, coarse_size, axis, side), vec4(color, alpha[axis]));
+        imageStore(coarser, part_texel(cell, coarse_size, axis, side),
+                   covered > 0.0 ? light * (alpha[axis] / covered) : vec4(0.0));
     }
+    vec4 back = vec4(0.0);
+    for (int k = 0; k < 8; ++k) {
+        back += imageLoad(finer_back, 2 * cell + ivec3(k & 1, (k >> 1) & 1, k >> 2));
+    }
+    float depth = alpha.x + alpha.y + alpha.z;
+    imageStore(coarser_back, cell, back.a > 0.0 ? back * (depth / back.a) : vec4(0.0));
 }

@@ -1,10 +1,13 @@
-// Light that leaves the voxels, by direction, and what they block: one 3D atlas of six parts.
+// What the voxels block, and what light leaves them, by direction.
 //
-// A part holds what is seen of each cell by rays that meet it along one axis from one side: alpha is the optical depth of
-// crossing the cell along that axis, τ/OPAQUE; the colour is radiance × alpha. Depths add up along a ray and interpolate
-// without losing any: ∫ τ over a linear blend of cells is their sum, however a ray is stepped through it. Opacities do not:
-// half of two half-opaque neighbours lets light through a wall that was whole (the usual 1 − (1 − α)^(step/voxel)).
-// The sides are normals' directions +x … −z: part (side, axis) lies at (side, 0, axis) of 2 × 1 × 3.
+// Blocking is kept as an optical depth along each axis, τ/OPAQUE. Depths add up along a ray and interpolate without losing
+// any: ∫ τ over a linear blend of cells is their sum, however a ray is stepped through it. Opacities do not: half of two
+// half-opaque neighbours lets light through a wall that was whole (the usual 1 − (1 − α)^(step/voxel)).
+//
+// Light is kept in an atlas of six parts, normals' directions +x … −z; part (side, axis) lies at (side, 0, axis) of
+// 2 × 1 × 3. A part holds the surfaces whose front faces that way: their share of the cell's depth along the axis in
+// alpha, and radiance × alpha. Light that leaves surfaces by their backs (a sheet without thickness, lit from behind) is in a
+// volume of its own. Fronts and backs apart, a slanted sheet is not half dark for one of the axes.
 
 #include "lib/math_lib.glsl"
 
@@ -56,28 +59,28 @@ vec3 cell_alpha(sampler3D coverage, ivec3 cell, int level)
 // What a ray along `direction` meets at a point in cells: source radiance in rgb, and in alpha the optical depth per
 // length of one cell of that level. A sheet across axis k has depth τ_k for a ray along k and τ_k |d_k| per unit length
 // for any other, so that the whole of it is τ_k at every angle.
-//
-// A slanted sheet is seen from its front or its back as a whole, though along one axis or two a ray may pass it
-// from the other side: what leaves that side is another ray's. So the axes weigh by τ_k ∓ N_k sign(d_k), with N the
-// surfaces' mean normal as a depth: 2 τ_k or 0 for a sheet, τ_k where fronts face apart.
-vec4 medium_at(sampler3D atlas, sampler3D facing, Grid grid, vec3 p, vec3 direction, float lod)
+vec4 medium_at(sampler3D atlas, sampler3D back, sampler3D opacity, Grid grid, vec3 p, vec3 direction, float lod,
+               bool leaving)
 {
     vec3 uvw = p / grid.size;
     vec3 w = abs(direction);
-    // Rays along +k see the sides that face −k.
-    vec4 x = part_at(atlas, grid, uvw, lod, 0, direction.x > 0.0);
-    vec4 y = part_at(atlas, grid, uvw, lod, 1, direction.y > 0.0);
-    vec4 z = part_at(atlas, grid, uvw, lod, 2, direction.z > 0.0);
-    vec3 alpha = vec3(x.a, y.a, z.a);
-    float depth = dot(w, alpha);
+    float depth = dot(w, textureLod(opacity, uvw, lod).rgb);
     if (depth <= 0.0) {
         return vec4(0.0);
     }
-    vec3 towards = -direction * textureLod(facing, uvw, lod).rgb * alpha;
-    float side = dot(towards, vec3(1.0)) >= 0.0 ? 1.0 : -1.0;
-    vec3 share = max(w * alpha + side * towards, vec3(0.0));
-    vec3 unit = share / max(alpha, vec3(1e-9)); // the parts hold radiance × alpha
-    float total = dot(share, vec3(1.0));
-    vec3 light = unit.x * x.rgb + unit.y * y.rgb + unit.z * z.rgb;
-    return vec4(total > 0.0 ? light / total : vec3(0.0), depth * OPAQUE);
+    // Rays along +k see fronts that face −k.
+    vec4 front = w.x * part_at(atlas, grid, uvw, lod, 0, direction.x > 0.0) +
+                 w.y * part_at(atlas, grid, uvw, lod, 1, direction.y > 0.0) +
+                 w.z * part_at(atlas, grid, uvw, lod, 2, direction.z > 0.0);
+    // A slanted sheet that is seen from its front still turns its back along an axis or two: backs are seen where they
+    // outweigh fronts.
+    vec3 light = front.a > 0.0 ? front.rgb / front.a : vec3(0.0);
+    float backs = max(depth - 2.0 * front.a, 0.0) / depth;
+    if (leaving) {
+        depth *= 1.0 - backs;
+    } else if (backs > 0.0) {
+        vec4 behind = textureLod(back, uvw, lod);
+        light = mix(light, behind.a > 0.0 ? behind.rgb / behind.a : vec3(0.0), backs);
+    }
+    return vec4(light, depth * OPAQUE);
 }
