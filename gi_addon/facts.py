@@ -41,6 +41,12 @@ class Facts:
     ao_distance: float
     medium: Medium | None = None  # that fills the world
     stamps: dict[str, str] = field(default_factory=dict)
+    emitters: Emitters = field(default_factory=Emitters.none)  # all of them, sampled as lights or not
+
+    @property
+    def glowing_voxels(self) -> bool:
+        """Whether emissive surfaces shine out of voxels rather than as lights drawn from them."""
+        return len(self.emitters) > 0 and voxels_shine(self.settings)
 
     @property
     def layers(self) -> tuple[str, ...]:
@@ -50,6 +56,11 @@ class Facts:
     @property
     def lit(self) -> bool:
         return bool(self.rig.sources)
+
+
+def voxels_shine(settings: Settings) -> bool:
+    """Whether the technique takes emission from voxels."""
+    return settings.technique == "VCT" and settings.vct.emissive_voxels and settings.use_area_lights
 
 
 def gather_facts(
@@ -68,7 +79,8 @@ def gather_facts(
     rig = build_rig(
         scene.lights, bounds,
         world=world, world_samples=s.world.samples,
-        emitters=emitters, emitter_samples=_EMITTER_SAMPLES, area_lights=s.use_area_lights,
+        emitters=Emitters.none() if voxels_shine(s) else emitters, emitter_samples=_EMITTER_SAMPLES,
+        area_lights=s.use_area_lights,
         shadows=s.use_shadows, bounces=s.use_indirect_diffuse and s.bounces > 0,
         shadow_resolution=s.shadows.resolution, bounce_resolution=s.rsm.resolution,
         world_resolution=s.world.resolution,
@@ -96,4 +108,5 @@ def gather_facts(
         ao_distance=s.ao.distance or scene.world.ao_distance,
         medium=mean_medium(scene.world.graph, scene.images),
         stamps=scene.stamps(),
+        emitters=emitters,
     )

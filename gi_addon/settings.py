@@ -134,6 +134,10 @@ class VCTSettings:
         6, "Cones", "Cones traced from each point into its hemisphere and sub-frame", low=1, high=64,
         higher="finer directions, sharper contact", lower="faster, blurrier",
     )  # fmt: skip
+    emissive_voxels: bool = _setting(
+        False, "Emissive Voxels", "Emissive surfaces shine out of the voxels, into the indirect passes: any number of them "
+        "without noise, as fine as the grid; else lights are drawn from them, into the direct passes",
+    )  # fmt: skip
     continuous_voxelization: bool = _setting(
         False, "Continuous Voxelization", "Voxelize in every sub-frame, as the paper's Table 2 has it; else only when a "
         "mesh, a transform or a material has changed. Light is always injected anew when it changes",

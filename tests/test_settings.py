@@ -10,6 +10,7 @@ import pytest
 from conftest import make
 
 from gi_addon.compare import scenes
+from gi_addon.engines import TECHNIQUES
 from gi_addon.settings import SettingError, Settings, markdown, walk
 
 # A value unlike the default for every setting, so that a new one without an entry fails here.
@@ -19,7 +20,8 @@ OTHER = {
     "viewport_samples": None, "bounces": 0, "pixel_filter": "BLACKMAN_HARRIS", "filter_width": 3.0,
     "shadows.resolution": 64, "shadows.softness": 6.0, "ao.samples": 1, "ao.steps": 1, "ao.distance": 0.3,
     "ao.contact": 0.5, "world.samples": 1, "world.resolution": 64, "rsm.resolution": 32, "rsm.samples": 7,
-    "gather_scale": 1,
+    "gather_scale": 1, "vct.resolution": 16, "vct.cones": 2, "vct.emissive_voxels": True,
+    "vct.continuous_voxelization": True,
 }  # fmt: skip
 # Not read by the picture itself: the viewport's own number of sub-frames; and effects whose techniques have yet to land.
 ELSEWHERE = {"viewport_samples", "technique", "use_glossy", "use_volumetric"}
@@ -33,13 +35,20 @@ def scene():
     s.materials[0] = scenes.principled(Base_Color=scenes.WHITE, Roughness=0.3)
     s.materials.append(scenes.principled(Transmission_Weight=0.8, Roughness=0.1))
     s.instances.materials[-1] = (len(s.materials) - 1,)
+    s.materials[1] = scenes.emissive((1.0, 0.6, 0.3), 2.0)
     s.world = scenes.world((0.3, 0.4, 0.5))
     return s
 
 
 @functools.cache
-def default_picture():
-    return make(scene(), "Combined", "Ambient Occlusion", samples=2)
+def default_picture(technique="RSM"):
+    return make(scene(), "Combined", "Ambient Occlusion", samples=2, technique=technique)
+
+
+def technique_of(path: str) -> str:
+    """Whose setting it is: shared ones are tried with RSM."""
+    group = path.split(".")[0].upper()
+    return group if group in TECHNIQUES else "RSM"
 
 
 @pytest.mark.parametrize("path", [p for p, _, _ in walk()])
@@ -47,8 +56,10 @@ def test_every_setting_changes_the_picture_or_the_plan(gl, path):
     if path in ELSEWHERE:
         assert OTHER[path] is None
         return
-    result = make(scene(), "Combined", "Ambient Occlusion", **{"samples": 2, path.replace(".", "__"): OTHER[path]})
-    base = default_picture()
+    technique = technique_of(path)
+    chosen = {"samples": 2, "technique": technique, path.replace(".", "__"): OTHER[path]}
+    result = make(scene(), "Combined", "Ambient Occlusion", **chosen)
+    base = default_picture(technique)
     changed = any(not np.array_equal(result.passes[n], base.passes[n]) for n in base.passes)
     assert changed or result.plan.text() != base.plan.text()
 

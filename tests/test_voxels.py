@@ -39,10 +39,12 @@ def voxels(gl, monkeypatch):
     def voxelise(scene, resolution=32, emission=False, change=None, **settings):
         reader = _EmissionReader if emission else _Reader
         tasks = [BRDFTables(), GBuffer(), Voxelisation(), reader()]
-        monkeypatch.setitem(TECHNIQUES, "RSM", lambda s, layers: [*tasks, Resolve(layers)])
+        monkeypatch.setitem(TECHNIQUES, "VCT", lambda s, layers: [*tasks, Resolve(layers)])
         chosen = Settings()
         chosen.set("vct.resolution", resolution)
         chosen.samples = 1
+        chosen.vct.emissive_voxels = emission
+        chosen.technique = "VCT"
         for name, value in settings.items():
             chosen.set(name.replace("__", "."), value)
 
@@ -260,6 +262,7 @@ def test_a_grid_that_does_not_fit_says_so_before_it_is_made(gl):
         try:
             s = Settings()
             s.samples = 1
+            s.technique = "VCT"
             s.set("vct.resolution", 256)
             renderer.render(scenes.cornell(), s, ("Combined",), resolution=PICTURE)
         finally:

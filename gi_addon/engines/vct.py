@@ -50,7 +50,7 @@ def _bounce_off(facts: Facts) -> str | None:
         return "indirect diffuse is switched off"
     if facts.settings.bounces == 0:
         return "bounces is 0"
-    return None if facts.lit else "no light shines"
+    return None if facts.lit or facts.glowing_voxels else "no light shines"
 
 
 def _atlas(facts: Facts) -> tuple[int, int, int]:
@@ -69,7 +69,7 @@ class VoxelCoverage(Pass):
                 "rgba16f", lambda f: voxel_grid(f).size, mips=lambda f: voxel_grid(f).levels, scratch=True),
         Texture("vct.facing", "voxel_facing", "which way fronts face, −1 … 1 along x, y, z: 0 where they face apart",
                 "rgba16f", lambda f: voxel_grid(f).size, mips=lambda f: voxel_grid(f).levels, scratch=True),
-        Texture("vct.opacity", "voxel_opacity", "optical depth of crossing the cell along x, y, z, over 8", "rgba16f",
+        Texture("vct.opacity", "voxel_opacity", "optical depth of crossing the cell along x, y, z, over 5", "rgba16f",
                 lambda f: voxel_grid(f).size, mips=lambda f: voxel_grid(f).levels, filter="linear", scratch=True),
     )  # fmt: skip
     uniforms = (
@@ -120,8 +120,8 @@ class RadianceInjection(Pass):
     title = "Voxel Radiance Injection"
     figure = "Voxel Radiance Injection, Voxel Anisotropic Mipmap Generation"
     reads = (
-        "vct.coverage", "vct.facing", "vct.opacity", "voxels.albedo", Optional("voxels.emission"), Optional("rsm.depth"), Optional("rsm.albedo"),
-        Optional("rsm.normal"), Optional("rsm.lights"), Optional("rsm.views"),
+        "vct.coverage", "vct.facing", "vct.opacity", "voxels.albedo", Optional("voxels.emission"),
+        Optional("rsm.depth"), Optional("rsm.albedo"), Optional("rsm.normal"), Optional("rsm.lights"), Optional("rsm.views"),
     )  # fmt: skip
     writes = (
         Texture("vct.radiance", "voxel_radiance", "by side and axis: radiance × alpha, W/(m²·sr), of surfaces whose fronts "
@@ -170,6 +170,8 @@ def build_mips(frame: Frame, planned: Planned, grid: VoxelGrid) -> None:
         frame.gl.ctx.memory_barrier()
 
 
+# What cones read.
+_VOLUMES = ("vct.radiance", "vct.back", "vct.opacity", "vct.facing")
 _CONE_UNIFORMS = (
     *GRID_UNIFORMS,
     Uniform("grid_levels", "float", "mips above the cells"),
@@ -190,7 +192,7 @@ class InterpolatedIndirect(Pass):
     """Indirect light at one pixel per block."""
 
     title = "Voxel Interpolated Indirect Lighting Computation"
-    reads = ("vct.radiance", "vct.back", "vct.opacity", "gbuffer.low_depth", "gbuffer.low_normal", "gbuffer.low_pixel")
+    reads = (*_VOLUMES, "gbuffer.low_depth", "gbuffer.low_normal", "gbuffer.low_pixel")
     writes = (
         Texture("indirect.low", "low_indirect", "radiance a white Lambert surface would reflect, W/(m²·sr)", "rgba32f",
                 gather_size, scratch=True),
@@ -220,7 +222,7 @@ class IndirectLighting(Pass):
     title = "Voxel Lighting Computation"
     figure = "Voxel Lighting Computation"
     reads = (
-        "vct.radiance", "vct.back", "vct.opacity", "gbuffer.depth", "gbuffer.normal", Optional("gbuffer.low_depth"), Optional("gbuffer.low_normal"),
+        *_VOLUMES, "gbuffer.depth", "gbuffer.normal", Optional("gbuffer.low_depth"), Optional("gbuffer.low_normal"),
         Optional("gbuffer.low_pixel"), Optional("indirect.low"), Optional("indirect.low_direction"),
     )  # fmt: skip
     writes = (

@@ -74,7 +74,7 @@ def _size(facts: Facts) -> tuple[int, int, int]:
 
 
 def _words(facts: Facts) -> int:
-    return _WORDS + (_EMISSION_WORDS if facts.emissive else 0)
+    return _WORDS + (_EMISSION_WORDS if facts.glowing_voxels else 0)
 
 
 def _slab(facts: Facts) -> int:
@@ -97,7 +97,7 @@ class Voxelisation(Pass):
         Texture("voxels.normal", "voxel_normal", "Σ area × opacity × normal of their fronts, world space, in cell faces: "
                 "shorter than the area where they face apart", "rgba16f", _size),
         Texture("voxels.emission", "voxel_emission", "mean emitted radiance, W/(m²·sr)", "rgba16f", _size,
-                when=lambda f: None if f.emissive else "no visible material emits"),
+                when=lambda f: None if f.glowing_voxels else "no voxel shines: nothing emits, or lights sampled on it do"),
         Buffer("voxels.sums", "voxel_sums", "fixed-point sums of the layers in the making", "uint", np.dtype("u4"),
                lambda f: _slab(f) * _size(f)[0] * _size(f)[1] * _words(f), scratch=True),
         Texture("voxels.raster", "voxel_raster", "stands for the grid's layers while triangles are drawn; holds nothing",
@@ -110,7 +110,7 @@ class Voxelisation(Pass):
     )
     shaders = {"resolve": {"compute": "passes/voxels_comp.glsl"}}
     depends = ("transforms", "meshes", "materials")
-    settings = ("vct.resolution",)
+    settings = ("vct.resolution", "vct.emissive_voxels", "use_area_lights")
 
     def rate(self, facts: Facts) -> str:
         return "subframe" if facts.settings.vct.continuous_voxelization else "static"
@@ -119,7 +119,7 @@ class Voxelisation(Pass):
         return None if facts.triangles else "the scene has no surfaces"
 
     def defines(self, facts: Facts) -> dict[str, int]:
-        return {"VOXEL_UNITS": UNITS, "VOXEL_WORDS": _words(facts), "VOXEL_EMISSION": int(facts.emissive)}
+        return {"VOXEL_UNITS": UNITS, "VOXEL_WORDS": _words(facts), "VOXEL_EMISSION": int(facts.glowing_voxels)}
 
     def run(self, frame: Frame, planned: Planned) -> None:
         facts = planned.facts
@@ -138,7 +138,7 @@ class Voxelisation(Pass):
             },
         }  # fmt: skip
         # An emitter of mean radiance fills 2¹⁶ units, so that textures may outshine their mean 4096 times over.
-        brightest = float(facts.rig.emitters.radiance.max()) if len(facts.rig.emitters) else 1.0
+        brightest = float(facts.emitters.radiance.max()) if len(facts.emitters) else 1.0
         values = {**grid.uniforms(), "emission_unit": max(brightest, 1e-30) / 65536.0}
         layers = _slab(facts)
         for first in range(0, grid.size[2], layers):

@@ -24,10 +24,14 @@ Gathered gather_cones(vec3 position_ws, vec3 n, vec3 ng, float reach, int count)
     Gathered g = Gathered(vec3(0.0), vec4(0.0), 0.0);
     Grid grid = voxel_grid();
     mat3 frame = frame_from_normal(n);
-    float above = surface_reach(ng);
-    vec3 start = (position_ws - grid.low) / grid.cell + ng * above;
+    vec3 start = (position_ws - grid.low) / grid.cell;
+    Departure from = cone_departure(voxel_facing, start, ng);
+    start += ng * from.above;
     vec2 shift = view.subframes > 1u ? sobol_2d(view.subframe, 40u) : vec2(0.5);
     float phase = view.subframes > 1u ? sobol_2d(view.subframe, 41u).x : 0.0;
+    // Neighbours turn their sets apart, in steps that 4 × 4 of them fill: what one set misses is no streak.
+    uvec2 place = uvec2(gl_FragCoord.xy) & 3u;
+    shift.y += float(place.x + 4u * place.y) / 16.0;
     float sin_half = inversesqrt(float(count) * cone_sharpness);
     float spread = sin_half * inversesqrt(max(1.0 - sin_half * sin_half, 1e-4));
     for (int i = 0; i < count; ++i) {
@@ -37,8 +41,8 @@ Gathered gather_cones(vec3 position_ws, vec3 n, vec3 ng, float reach, int count)
         if (dot(d, ng) <= 0.0) {
             continue; // into the triangle
         }
-        ConeResult cone = trace_cone(voxel_radiance, voxel_back, voxel_opacity, grid, start, d, spread, above,
-                                     reach / grid.cell, ng, above, phase);
+        ConeResult cone = trace_cone(voxel_radiance, voxel_back, voxel_opacity, grid, start, d, spread, from.above,
+                                     reach / grid.cell, ng, from.above, from.leaving, phase);
         g.radiance += cone.radiance;
         g.open_ += cone.transmittance;
         g.direction += vec4(d, 1.0) * (luminance(cone.radiance) / max(sqrt(1.0 - r2), sin_half));

@@ -11,8 +11,9 @@
 
 #include "lib/math_lib.glsl"
 
-// Optical depth of a whole surface: it lets e^−8 = 0.03 % pass, and half floats hold radiance × 1 without rounding it.
-const float OPAQUE = 8.0;
+// Optical depth of a whole surface: it lets e^−5 = 0.7 % pass. A deeper one is met farther before its middle, as if all
+// were thicker: measured on an empty Cornell box, 8 gives relMSE .0109 and gain 1.054, 5 gives .0089 and 1.039.
+const float OPAQUE = 5.0;
 
 struct Grid {
     vec3 low;      // corner, m
@@ -58,9 +59,9 @@ vec3 cell_alpha(sampler3D coverage, ivec3 cell, int level)
 
 // What a ray along `direction` meets at a point in cells: source radiance in rgb, and in alpha the optical depth per
 // length of one cell of that level. A sheet across axis k has depth τ_k for a ray along k and τ_k |d_k| per unit length
-// for any other, so that the whole of it is τ_k at every angle.
+// for any other, so that the whole of it is τ_k at every angle. `leaving` 1 lets backs pass, −1 fronts, 0 nothing.
 vec4 medium_at(sampler3D atlas, sampler3D back, sampler3D opacity, Grid grid, vec3 p, vec3 direction, float lod,
-               bool leaving)
+               float leaving)
 {
     vec3 uvw = p / grid.size;
     vec3 w = abs(direction);
@@ -76,9 +77,10 @@ vec4 medium_at(sampler3D atlas, sampler3D back, sampler3D opacity, Grid grid, ve
     // outweigh fronts.
     vec3 light = front.a > 0.0 ? front.rgb / front.a : vec3(0.0);
     float backs = max(depth - 2.0 * front.a, 0.0) / depth;
-    if (leaving) {
-        depth *= 1.0 - backs;
-    } else if (backs > 0.0) {
+    if (leaving != 0.0) {
+        depth *= leaving > 0.0 ? 1.0 - backs : backs;
+    }
+    if (backs > 0.0) {
         vec4 behind = textureLod(back, uvw, lod);
         light = mix(light, behind.a > 0.0 ? behind.rgb / behind.a : vec3(0.0), backs);
     }
