@@ -20,7 +20,7 @@ OTHER = {
     "viewport_samples": None, "bounces": 0, "pixel_filter": "BLACKMAN_HARRIS", "filter_width": 3.0,
     "shadows.resolution": 64, "shadows.softness": 6.0, "ao.samples": 1, "ao.steps": 1, "ao.distance": 0.3,
     "ao.contact": 0.5, "world.samples": 1, "world.resolution": 64, "rsm.resolution": 32, "rsm.samples": 7,
-    "gather_scale": 1, "vct.resolution": 16, "vct.cones": 2, "vct.emissive_voxels": True,
+    "gather_scale": 1, "vct.resolution": 16, "vct.cones": 2, "vct.emissive_voxels": True, "vct.shadow_cones": True,
     "vct.continuous_voxelization": True,
 }  # fmt: skip
 # Not read by the picture itself: the viewport's own number of sub-frames; and effects whose techniques have yet to land.

@@ -11,7 +11,6 @@ from __future__ import annotations
 from ..facts import Facts
 from ..frame import Frame
 from ..graph import Optional, Pass, Planned, Texture, Uniform
-from ..passes.ao import AOBlur, AOGeneration
 from ..passes.brdf_tables import BRDFTables
 from ..passes.direct_lighting import DirectLighting
 from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentTint, _screen, gather_size
@@ -28,7 +27,7 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
     return [
         BRDFTables(),
         LightList(),
-        ShadowMaps(),
+        *([] if settings.vct.shadow_cones else [ShadowMaps()]),
         RSMGeneration(),
         Voxelisation(),
         VoxelCoverage(),
@@ -36,10 +35,11 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         GBuffer(),
         TranslucentTint(),
         GBufferMips(),
-        AOGeneration(),
-        AOBlur(),
+        VoxelAO(),
         InterpolatedIndirect(),
         IndirectLighting(),
+        GlossyCones(),
+        *([ShadowCones()] if settings.vct.shadow_cones and settings.use_shadows else []),
         DirectLighting(),
         Resolve(layers),
     ]
@@ -176,7 +176,7 @@ _CONE_UNIFORMS = (
     *GRID_UNIFORMS,
     Uniform("grid_levels", "float", "mips above the cells"),
     Uniform("cone_count", "int", "cones per point and sub-frame"),
-    Uniform("cone_sharpness", "float", "how many sets of cones share the hemisphere"),
+    Uniform("cone_sets", "float", "sub-frames, whose sets of cones share the hemisphere"),
 )
 
 
@@ -184,7 +184,7 @@ def _set_cones(frame: Frame, program, facts: Facts) -> None:
     grid = voxel_grid(facts)
     frame.set(
         program, **grid.uniforms(), grid_levels=float(grid.levels), cone_count=facts.settings.vct.cones,
-        cone_sharpness=float(facts.subframes),
+        cone_sets=float(facts.subframes),
     )  # fmt: skip
 
 
@@ -242,3 +242,78 @@ class IndirectLighting(Pass):
         program = frame.program(planned)
         _set_cones(frame, program, planned.facts)
         frame.screen(planned, program)
+
+
+class VoxelAO(Pass):
+    """Ambient occlusion by short cones."""
+
+    title = "Voxel Ambient Occlusion"
+    figure = "Voxel Lighting Computation"
+    reads = (*_VOLUMES, "gbuffer.depth", "gbuffer.normal")
+    writes = (
+        Texture("ao", "ao", "ambient occlusion within the AO distance; 1; 1 = open", "rg16f", _screen),
+    )  # fmt: skip
+    uniforms = (*_CONE_UNIFORMS, Uniform("ao_distance", "float", "how far an occluder counts, m"))
+    shaders = {"main": {"vertex": _FULLSCREEN, "fragment": "engines/vct/ao_frag.glsl"}}
+
+    def absent(self, facts: Facts) -> str | None:
+        return None if facts.settings.use_ao else "ambient occlusion is switched off"
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        program = frame.program(planned)
+        _set_cones(frame, program, planned.facts)
+        frame.set(program, ao_distance=min(planned.facts.ao_distance, 2.0 * planned.facts.radius))
+        frame.screen(planned, program)
+
+
+class GlossyCones(Pass):
+    """What glossy surfaces mirror: one cone a sub-frame, as wide as the lobe's share."""
+
+    title = "Voxel Glossy Reflections"
+    figure = "Voxel Lighting Computation"
+    reads = (
+        *_VOLUMES, "gbuffer.depth", "gbuffer.normal", "gbuffer.specular", "gbuffer.lobe", "brdf.energy", "brdf.average",
+    )  # fmt: skip
+    writes = (
+        Texture("indirect.glossy", "indirect_glossy", "radiance reflected by the glossy lobe, with its colour, W/(m²·sr)",
+                "rgba32f", _screen),
+    )  # fmt: skip
+    uniforms = _CONE_UNIFORMS
+    shaders = {"main": {"vertex": _FULLSCREEN, "fragment": "engines/vct/glossy_frag.glsl"}}
+
+    def absent(self, facts: Facts) -> str | None:
+        if not facts.settings.use_glossy:
+            return "glossy reflections are switched off"
+        if not facts.glossy:
+            return "no visible material is glossy"
+        return _bounce_off(facts)
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        program = frame.program(planned)
+        _set_cones(frame, program, planned.facts)
+        frame.screen(planned, program)
+
+
+class ShadowCones(Pass):
+    """Shadows by one cone a light, as wide as the light looks."""
+
+    title = "Voxel Shadow Cones"
+    figure = "Voxel Lighting Computation"
+    reads = (*_VOLUMES, "lights", "gbuffer.depth", "gbuffer.normal")
+    writes = (
+        Texture("shadow.cones", "shadow_cones", "share of each light that reaches the surface", "r16f",
+                lambda f: (*f.resolution, max(1, len(f.rig.sources))), layers=True),
+    )  # fmt: skip
+    uniforms = (*_CONE_UNIFORMS, Uniform("light_count", "int", "lights in the list"))
+    shaders = {"main": {"compute": "engines/vct/shadow_comp.glsl"}}
+
+    def absent(self, facts: Facts) -> str | None:
+        if not facts.settings.use_shadows:
+            return "shadows are switched off"
+        return None if facts.lit else "no light shines"
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        program = frame.program(planned)
+        _set_cones(frame, program, planned.facts)
+        frame.set(program, light_count=len(planned.facts.rig.sources))
+        frame.compute(planned, program, planned.facts.resolution)

@@ -53,6 +53,9 @@ void main()
             vec3 receiver_ws = position_ws + n * depth_bulge.g;
             vec3 receiver_ng = behind ? n : ng;
             float visible = 1.0;
+#if HAS_SHADOW_CONES
+            visible = texelFetch(shadow_cones, ivec3(pixel, i), 0).r;
+#else
             if (light.views > 0) {
                 LightView v = light_views[light_view_of(light, position_ws)];
 #if HAS_SHADOW_DEPTH
@@ -66,6 +69,7 @@ void main()
                 }
 #endif
             }
+#endif
             vec3 irradiance = arriving * cos_l;
             open_light += irradiance;
             lit_light += irradiance * visible;

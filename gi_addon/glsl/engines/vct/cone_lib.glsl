@@ -37,37 +37,90 @@ Departure cone_departure(sampler3D facing, vec3 p, vec3 n)
     return Departure(mix(1.5, 1.0, saturate(abs(one_way))) * l1, one_way < -0.5 ? -1.0 : 1.0);
 }
 
-// `start` in cells, `direction` a unit vector, `spread` the tangent of the cone's half angle, `apex` how far behind
-// `start` its tip lies, `reach` how far it goes, in cells. Over a receiver of normal `n` (0 for none) that lies `above` cells
-// below the start, mips are kept so fine that they don't reach back down to it. `phase` in [0, 1) shifts the first step.
-ConeResult trace_cone(sampler3D atlas, sampler3D back, sampler3D opacity, Grid grid, vec3 start, vec3 direction, float spread, float apex, float reach,
-                      vec3 n, float above, float leaving, float phase)
+// `start` in cells, `direction` a unit vector, `spread` the tangent of the half angle, `apex` how far behind `start` the tip
+// lies, `reach` how far it goes, all in cells. Over a receiver of normal `n` (0 for none) that the start has left as `from`
+// says, mips are kept so fine that they don't reach back down to it.
+struct Cone {
+    vec3 start;
+    vec3 direction;
+    float spread;
+    float apex;
+    float reach;
+    vec3 n;
+    Departure from;
+};
+
+// Leaves the grid, or has gone its way, here.
+float cone_end(Cone cone, Grid grid)
+{
+    vec3 d = mix(cone.direction, vec3(1e-9), lessThan(abs(cone.direction), vec3(1e-9)));
+    vec3 far = max(-cone.start / d, (grid.size - cone.start) / d);
+    return min(min(far.x, min(far.y, far.z)), cone.reach);
+}
+
+// Which level to read at `t`. A disc of diameter D varies by D/4 a side; a cell of width s, blended with its
+// neighbours, by s/2. So s = D/2.
+float cone_level(Cone cone, Grid grid, float t)
+{
+    float width = cone.spread * (t + cone.apex);
+    float span = surface_reach(cone.n);
+    if (span > 0.0) {
+        width = min(width, (cone.from.above + t * dot(cone.direction, cone.n)) / span);
+    }
+    return clamp(log2(max(width, 1e-6)), 0.0, grid.levels);
+}
+
+// Where all around is empty a cone takes four steps at once: a filtered 0 of three levels above says that nothing lies
+// within half a cell of that level, four of this.
+float empty_stride(sampler3D opacity, Grid grid, vec3 p, float lod)
+{
+    if (lod + 3.0 > grid.levels) {
+        return 1.0;
+    }
+    return textureLod(opacity, p / grid.size, ceil(lod) + 3.0).rgb == vec3(0.0) ? 3.0 : 1.0;
+}
+
+// `phase` in [0, 1) shifts the first step.
+ConeResult trace_cone(sampler3D atlas, sampler3D back, sampler3D opacity, Grid grid, Cone cone, float phase)
 {
     ConeResult result = ConeResult(vec3(0.0), 1.0);
-    // Leaves the grid here.
-    vec3 inverse = 1.0 / mix(direction, vec3(1e-9), lessThan(abs(direction), vec3(1e-9)));
-    vec3 far = max(-start * inverse, (grid.size - start) * inverse);
-    float end = min(min(far.x, min(far.y, far.z)), reach);
-    float climb = dot(direction, n);
-    float span = surface_reach(n);
+    float end = cone_end(cone, grid);
     float t = 0.0;
     for (int i = 0; i < CONE_MOST_STEPS; ++i) {
-        // A disc of diameter D varies by D/4 a side; a cell of width s, blended with its neighbours, by s/2. So s = D/2.
-        float width = spread * (t + apex);
-        if (span > 0.0) {
-            width = min(width, (above + t * climb) / span);
-        }
-        float lod = clamp(log2(width), 0.0, grid.levels);
-        float size = exp2(lod);
         if (t >= end || result.transmittance < CONE_END) {
             break;
         }
+        float lod = cone_level(cone, grid, t);
+        float size = exp2(lod);
         float step_ = min(i == 0 ? size * (1.0 - phase) : size, end - t);
-        vec4 medium = medium_at(atlas, back, opacity, grid, start + direction * (t + 0.5 * step_), direction, lod, t < LEAVING * size ? leaving : 0.0);
+        vec3 p = cone.start + cone.direction * (t + 0.5 * step_);
+        vec4 medium = medium_at(atlas, back, opacity, grid, p, cone.direction, lod,
+                                t < LEAVING * size ? cone.from.leaving : 0.0);
         float through = exp(-medium.a * step_ / size);
         result.radiance += result.transmittance * (1.0 - through) * medium.rgb;
         result.transmittance *= through;
-        t += step_;
+        t += medium.a > 0.0 ? step_ : step_ * empty_stride(opacity, grid, p, lod);
     }
     return result;
+}
+
+// The same without light: what of the cone is open.
+float trace_open(sampler3D atlas, sampler3D opacity, Grid grid, Cone cone, float phase)
+{
+    float transmittance = 1.0;
+    float end = cone_end(cone, grid);
+    float t = 0.0;
+    for (int i = 0; i < CONE_MOST_STEPS; ++i) {
+        if (t >= end || transmittance < CONE_END) {
+            break;
+        }
+        float lod = cone_level(cone, grid, t);
+        float size = exp2(lod);
+        float step_ = min(i == 0 ? size * (1.0 - phase) : size, end - t);
+        vec3 p = cone.start + cone.direction * (t + 0.5 * step_);
+        float depth = depth_at(atlas, opacity, grid, p, cone.direction, lod, t < LEAVING * size ? cone.from.leaving : 0.0);
+        transmittance *= exp(-depth * step_ / size);
+        t += depth > 0.0 ? step_ : step_ * empty_stride(opacity, grid, p, lod);
+    }
+    return transmittance;
 }

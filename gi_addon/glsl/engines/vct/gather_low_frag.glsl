@@ -17,7 +17,7 @@ void main()
     vec2 uv = (vec2(gather_grid_pixel(block, texelFetch(low_pixel, block, 0).rg)) + 0.5) * view.inverse_resolution;
     vec4 normals = texelFetch(low_normal, block, 0);
     Gathered g = gather_cones(position_ws_from_depth(uv, depth), octahedral_decode(normals.xy),
-                              octahedral_decode(normals.zw), 1e30, cone_count);
+                              octahedral_decode(normals.zw));
     low_indirect = vec4(g.radiance, 1.0);
     low_direction = g.direction;
 }

@@ -27,7 +27,7 @@ void main()
     found = interpolated_indirect(position_ws, n, ng, depth, radiance);
 #endif
     if (!found) {
-        radiance = gather_cones(position_ws, n, ng, 1e30, cone_count).radiance;
+        radiance = gather_cones(position_ws, n, ng).radiance;
     }
     indirect_diffuse = vec4(radiance, 1.0);
 }

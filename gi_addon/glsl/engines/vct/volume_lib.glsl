@@ -57,22 +57,39 @@ vec3 cell_alpha(sampler3D coverage, ivec3 cell, int level)
     return min(here * (-log(max(1.0 - sum, exp(-OPAQUE))) / (sum * OPAQUE)), vec3(1.0));
 }
 
-// What a ray along `direction` meets at a point in cells: source radiance in rgb, and in alpha the optical depth per
-// length of one cell of that level. A sheet across axis k has depth τ_k for a ray along k and τ_k |d_k| per unit length
-// for any other, so that the whole of it is τ_k at every angle. `leaving` 1 lets backs pass, −1 fronts, 0 nothing.
+// Rays along +k see fronts that face −k.
+vec4 fronts_at(sampler3D atlas, Grid grid, vec3 uvw, vec3 direction, float lod)
+{
+    vec3 w = abs(direction);
+    return w.x * part_at(atlas, grid, uvw, lod, 0, direction.x > 0.0) +
+           w.y * part_at(atlas, grid, uvw, lod, 1, direction.y > 0.0) +
+           w.z * part_at(atlas, grid, uvw, lod, 2, direction.z > 0.0);
+}
+
+// Optical depth per length of one cell of the level, for a ray along `direction` at a point in cells. A sheet across axis
+// k has depth τ_k for a ray along k and τ_k |d_k| per unit length for any other, so that the whole of it is τ_k at every
+// angle. `leaving` 1 lets backs pass, −1 fronts, 0 nothing.
+float depth_at(sampler3D atlas, sampler3D opacity, Grid grid, vec3 p, vec3 direction, float lod, float leaving)
+{
+    vec3 uvw = p / grid.size;
+    float depth = dot(abs(direction), textureLod(opacity, uvw, lod).rgb);
+    if (leaving != 0.0 && depth > 0.0) {
+        float backs = max(depth - 2.0 * fronts_at(atlas, grid, uvw, direction, lod).a, 0.0) / depth;
+        depth *= leaving > 0.0 ? 1.0 - backs : backs;
+    }
+    return depth * OPAQUE;
+}
+
+// What a ray meets there: source radiance in rgb, that depth in alpha.
 vec4 medium_at(sampler3D atlas, sampler3D back, sampler3D opacity, Grid grid, vec3 p, vec3 direction, float lod,
                float leaving)
 {
     vec3 uvw = p / grid.size;
-    vec3 w = abs(direction);
-    float depth = dot(w, textureLod(opacity, uvw, lod).rgb);
+    float depth = dot(abs(direction), textureLod(opacity, uvw, lod).rgb);
     if (depth <= 0.0) {
         return vec4(0.0);
     }
-    // Rays along +k see fronts that face −k.
-    vec4 front = w.x * part_at(atlas, grid, uvw, lod, 0, direction.x > 0.0) +
-                 w.y * part_at(atlas, grid, uvw, lod, 1, direction.y > 0.0) +
-                 w.z * part_at(atlas, grid, uvw, lod, 2, direction.z > 0.0);
+    vec4 front = fronts_at(atlas, grid, uvw, direction, lod);
     // A slanted sheet that is seen from its front still turns its back along an axis or two: backs are seen where they
     // outweigh fronts.
     vec3 light = front.a > 0.0 ? front.rgb / front.a : vec3(0.0);
