@@ -53,6 +53,10 @@ def _bounce_off(facts: Facts) -> str | None:
     return None if facts.lit or facts.glowing_voxels else "no light shines"
 
 
+def _one_bounce(facts: Facts) -> str | None:
+    return None if facts.settings.bounces > 1 and facts.settings.use_indirect_diffuse else "one bounce needs no other"
+
+
 def _atlas(facts: Facts) -> tuple[int, int, int]:
     """Six parts, two sides by three axes."""
     x, y, z = voxel_grid(facts).size
@@ -130,18 +134,26 @@ class RadianceInjection(Pass):
         Texture("vct.back", "voxel_back", "radiance × alpha, W/(m²·sr), that leaves surfaces by their backs; alpha, the sum of "
                 "vct.opacity", "rgba16f", lambda f: voxel_grid(f).size, mips=lambda f: voxel_grid(f).levels,
                 filter="linear", scratch=True),
+        Texture("vct.bounce", "voxel_bounce", "by side and axis: radiance of the later bounces, W/(m²·sr)", "rgba16f",
+                _atlas, when=_one_bounce, scratch=True),
+        Texture("vct.bounce_back", "voxel_bounce_back", "the same by the surfaces' backs", "rgba16f",
+                lambda f: voxel_grid(f).size, when=_one_bounce, scratch=True),
     )  # fmt: skip
     uniforms = (
         *GRID_UNIFORMS,
+        Uniform("grid_levels", "float", "mips above the cells"),
+        Uniform("cone_count", "int", "cones that each cell gathers by"),
         Uniform("view_count", "int", "reflective shadow maps in the list"),
         Uniform("first_time", "int", "1 when empty cells are due too"),
+        Uniform("add_bounce", "int", "1 when later bounces are known"),
     )
     shaders = {
         "main": {"compute": "engines/vct/inject_comp.glsl"},
+        "bounce": {"compute": "engines/vct/bounce_comp.glsl"},
         "mips": {"compute": "engines/vct/mips_comp.glsl"},
     }
     depends = ("lights", "world", "transforms", "meshes", "materials")
-    settings = ("vct.resolution",)
+    settings = ("vct.resolution", "vct.emissive_voxels", "vct.cones", "bounces", "use_area_lights")
 
     def rate(self, facts: Facts) -> str:
         return RSMGeneration().rate(facts) if facts.rig.bounce.sizes else "static"
@@ -149,11 +161,28 @@ class RadianceInjection(Pass):
     def run(self, frame: Frame, planned: Planned) -> None:
         grid = voxel_grid(planned.facts)
         program = frame.program(planned)
-        frame.set(
-            program, view_count=len(planned.facts.rig.bounce.sizes), first_time=int(planned.stale), **grid.uniforms()
-        )
+        values = {
+            "view_count": len(planned.facts.rig.bounce.sizes), "first_time": int(planned.stale),
+            "grid_levels": float(grid.levels), "cone_count": planned.facts.settings.vct.cones, **grid.uniforms(),
+        }  # fmt: skip
+        again = planned.facts.settings.bounces - 1 if planned.has("vct.bounce") else 0
+        for k in range(again + 1):
+            if k:
+                self._bounce(frame, planned, grid, values)
+                frame.resources["vct.bounce"].use(12)
+                frame.resources["vct.bounce_back"].use(13)
+            frame.set(program, add_bounce=int(k > 0), **values)
+            frame.compute(planned, program, grid.size, (4, 4, 4))
+            build_mips(frame, planned, grid)
+
+    @staticmethod
+    def _bounce(frame: Frame, planned: Planned, grid: VoxelGrid, values: dict) -> None:
+        """Gather what the voxels hold into vct.bounce."""
+        program = frame.program(planned, "bounce")
+        frame.resources["vct.radiance"].use(12)
+        frame.resources["vct.back"].use(13)
+        frame.set(program, **values)
         frame.compute(planned, program, grid.size, (4, 4, 4))
-        build_mips(frame, planned, grid)
 
 
 def build_mips(frame: Frame, planned: Planned, grid: VoxelGrid) -> None:
@@ -163,8 +192,8 @@ def build_mips(frame: Frame, planned: Planned, grid: VoxelGrid) -> None:
     for level in range(grid.levels):
         size = tuple(n // 2 for n in size)
         for k, name in enumerate(("vct.radiance", "vct.back")):
-            frame.resources[name].bind_to_image(2 + 2 * k, read=True, write=False, level=level)
-            frame.resources[name].bind_to_image(3 + 2 * k, read=False, write=True, level=level + 1)
+            frame.resources[name].bind_to_image(4 + 2 * k, read=True, write=False, level=level)
+            frame.resources[name].bind_to_image(5 + 2 * k, read=False, write=True, level=level + 1)
         frame.set(program, coarse_size=size, coarse_level=level + 1)
         program.run(*(-(-n // 4) for n in size))
         frame.gl.ctx.memory_barrier()

@@ -23,7 +23,7 @@ void main()
     float phase = cone_phase();
     float open_ = 0.0;
     for (int i = 0; i < cone_count; ++i) {
-        cone.direction = frame * cone_direction(i, cone_count);
+        cone.direction = frame * cone_direction(i, cone_count, false);
         if (dot(cone.direction, ng) > 0.0) {
             open_ += trace_open(voxel_radiance, voxel_opacity, grid, cone, phase);
         }

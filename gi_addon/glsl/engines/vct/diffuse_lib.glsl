@@ -26,13 +26,14 @@ float cone_spread(int count)
 
 float cone_phase() { return view.subframes > 1u ? sobol_2d(view.subframe, 41u).x : 0.0; }
 
-// Direction `i` of `count` about +z. Neighbours turn their sets apart by sixteenths: what one set misses is no streak.
-vec3 cone_direction(int i, int count)
+// Direction `i` of `count` about +z. Where the result is interpolated, neighbours turn their sets apart by sixteenths: what one
+// set misses is no streak.
+vec3 cone_direction(int i, int count, bool turned)
 {
     vec2 shift = view.subframes > 1u ? sobol_2d(view.subframe, 40u) : vec2(0.5);
     uvec2 place = uvec2(gl_FragCoord.xy) & 3u;
     float r2 = (float(i) + shift.x) / float(count);
-    float phi = GOLDEN_ANGLE * float(i) + TAU * (shift.y + float(place.x + 4u * place.y) / 16.0);
+    float phi = GOLDEN_ANGLE * float(i) + TAU * (shift.y + (turned ? float(place.x + 4u * place.y) / 16.0 : 0.0));
     return vec3(sqrt(r2) * vec2(cos(phi), sin(phi)), sqrt(1.0 - r2));
 }
 
@@ -53,7 +54,7 @@ Gathered gather_cones(vec3 position_ws, vec3 n, vec3 ng)
     Cone cone = surface_cone(grid, position_ws, ng, n, spread, 1e30);
     float phase = cone_phase();
     for (int i = 0; i < cone_count; ++i) {
-        vec3 local = cone_direction(i, cone_count);
+        vec3 local = cone_direction(i, cone_count, true);
         cone.direction = frame * local;
         if (dot(cone.direction, ng) <= 0.0) {
             continue; // into the triangle

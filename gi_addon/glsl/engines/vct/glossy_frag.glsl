@@ -31,9 +31,7 @@ void main()
     mat3 frame = frame_from_normal(n);
     vec3 v_local = v * frame;
     v_local.z = max(abs(v_local.z), 1e-3);
-    uvec2 place = uvec2(gl_FragCoord.xy) & 3u;
     vec2 u = view.subframes > 1u ? sobol_2d(view.subframe, 43u) : vec2(0.0);
-    u.y = fract(u.y + float(place.x + 4u * place.y) / 16.0);
     vec3 h = ggx_sample_visible_normal(v_local, alpha, u);
     vec3 l_local = reflect(-v_local, h);
     vec3 l = frame * l_local;

@@ -15,6 +15,11 @@
 
 layout(local_size_x = 4, local_size_y = 4, local_size_z = 4) in;
 
+#if HAS_VOXEL_BOUNCE
+layout(binding = 12) uniform sampler3D bounce_now;
+layout(binding = 13) uniform sampler3D bounce_back_now;
+#endif
+
 // Points of a cell: M. Roberts' R3 sequence, multiples of the powers of 1/1.2207… (root of x⁴ = x + 1).
 const int POINTS = 16;
 const vec3 R3 = vec3(0.8191725134, 0.6710436067, 0.5497004779);
@@ -125,6 +130,14 @@ void main()
     back += emission;
     for (int f = 0; f < 6; ++f) {
         leaving[f] += emission;
+    }
+#endif
+#if HAS_VOXEL_BOUNCE
+    if (add_bounce == 1 && !empty) {
+        back += texelFetch(bounce_back_now, cell, 0).rgb;
+        for (int f = 0; f < 6; ++f) {
+            leaving[f] += texelFetch(bounce_now, part_texel(cell, grid_size, f >> 1, f & 1), 0).rgb;
+        }
     }
 #endif
     vec3 alpha = texelFetch(voxel_opacity, cell, 0).rgb;

@@ -4,10 +4,10 @@
 #include "engines/vct/volume_lib.glsl"
 
 layout(local_size_x = 4, local_size_y = 4, local_size_z = 4) in;
-layout(binding = 2, rgba16f) readonly uniform image3D finer;
-layout(binding = 3, rgba16f) writeonly uniform image3D coarser;
-layout(binding = 4, rgba16f) readonly uniform image3D finer_back;
-layout(binding = 5, rgba16f) writeonly uniform image3D coarser_back;
+layout(binding = 4, rgba16f) readonly uniform image3D finer;
+layout(binding = 5, rgba16f) writeonly uniform image3D coarser;
+layout(binding = 6, rgba16f) readonly uniform image3D finer_back;
+layout(binding = 7, rgba16f) writeonly uniform image3D coarser_back;
 uniform ivec3 coarse_size;
 uniform int coarse_level;
 

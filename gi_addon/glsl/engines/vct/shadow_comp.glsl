@@ -30,6 +30,8 @@ void main()
         float visible = 1.0;
         if (depth > 0.0 && light.views > 0 && dot(n, l) > 0.0 && max3(arriving) > 0.0) {
             float reach = light_is_directional(light) ? 1e30 : distance(light.position_ws, position_ws) / grid.cell;
+            // Not into the blur of what the light hangs from.
+            reach = max(reach - from.above - surface_reach(l), 0.0);
             float spread = tan(min(angle, 0.785)); // 45°
             visible = trace_open(voxel_radiance, voxel_opacity, grid,
                                  Cone(p + ng * from.above, l, spread, from.above, reach, ng, from), 0.0);
