@@ -117,6 +117,15 @@ class RSMSettings:
         200, "Samples", "Virtual point lights gathered per pixel and sub-frame", low=1, high=4096,
         higher="less blotchy near surfaces", lower="faster",
     )  # fmt: skip
+    visibility: str = _setting(
+        "CELLS", "Visibility", "Whether virtual lights are blocked by objects",
+        choices=(("NONE", "None", "They shine through everything, as in 2005; near contacts are dimmed by ambient occlusion"),
+                 ("CELLS", "Cells", "Rays to them are tested in a grid of the cells that surfaces pass through")),
+    )  # fmt: skip
+    visibility_resolution: int = _setting(
+        128, "Visibility Resolution", "Cells along the scene's longest side", low=16, high=512,
+        higher="finer shadows in indirect light", lower="faster",
+    )  # fmt: skip
 
 
 @dataclass

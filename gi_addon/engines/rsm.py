@@ -17,6 +17,7 @@ from ..passes.brdf_tables import BRDFTables
 from ..passes.direct_lighting import DirectLighting
 from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentTint, _screen, gather_size
 from ..passes.lights import LightList, RSMGeneration, ShadowMaps
+from ..passes.occupancy import CELL_UNIFORMS, Occupancy, set_cells
 from ..passes.resolve import Resolve
 from ..settings import Settings
 
@@ -30,6 +31,7 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         RSMGeneration(),
         RSMFlux(),
         RSMSamplingPattern(),
+        Occupancy(),
         GBuffer(),
         TranslucentTint(),
         GBufferMips(),
@@ -131,14 +133,14 @@ class InterpolatedIndirect(Pass):
 
     title = "RSM Interpolated Indirect Lighting Computation"
     figure = "RSM Interpolated Indirect Lighting Computation"
-    reads = ("vpls", "gbuffer.low_depth", "gbuffer.low_normal", "gbuffer.low_pixel")
+    reads = ("vpls", Optional("occupancy"), "gbuffer.low_depth", "gbuffer.low_normal", "gbuffer.low_pixel")
     writes = (
         Texture("indirect.low", "low_indirect", "radiance a white Lambert surface would reflect, W/(m²·sr)", "rgba32f",
                 gather_size, scratch=True),
         Texture("indirect.low_direction", "low_direction", "Σ luminance × direction, and Σ luminance, of what arrives",
                 "rgba32f", gather_size, scratch=True),
     )  # fmt: skip
-    uniforms = (Uniform("vpl_count", "int", "virtual point lights in the list"),)
+    uniforms = (Uniform("vpl_count", "int", "virtual point lights in the list"), *CELL_UNIFORMS)
     shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/rsm/gather_low_frag.glsl"}}
 
     def defines(self, facts: Facts) -> dict[str, int]:
@@ -150,6 +152,7 @@ class InterpolatedIndirect(Pass):
     def run(self, frame: Frame, planned: Planned) -> None:
         program = frame.program(planned)
         frame.set(program, vpl_count=planned.facts.settings.rsm.samples)
+        set_cells(frame, program, planned.facts)
         frame.screen(planned, program)
 
 
@@ -159,7 +162,7 @@ class IndirectLighting(Pass):
     title = "RSM Lighting Computation"
     figure = "RSM Lighting Computation"
     reads = (
-        "vpls", "gbuffer.depth", "gbuffer.normal", Optional("gbuffer.low_depth"), Optional("gbuffer.low_normal"),
+        "vpls", Optional("occupancy"), "gbuffer.depth", "gbuffer.normal", Optional("gbuffer.low_depth"), Optional("gbuffer.low_normal"),
         Optional("gbuffer.low_pixel"), Optional("indirect.low"), Optional("indirect.low_direction"),
         Optional("ao"),
     )  # fmt: skip
@@ -167,7 +170,7 @@ class IndirectLighting(Pass):
         Texture("indirect.diffuse", "indirect_diffuse", "radiance a white Lambert surface would reflect, W/(m²·sr)",
                 "rgba32f", _screen, when=lambda f: None if f.diffuse else "no visible material is diffuse"),
     )  # fmt: skip
-    uniforms = (Uniform("vpl_count", "int", "virtual point lights in the list"),)
+    uniforms = (Uniform("vpl_count", "int", "virtual point lights in the list"), *CELL_UNIFORMS)
     shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/rsm/lighting_frag.glsl"}}
 
     def defines(self, facts: Facts) -> dict[str, int]:
@@ -176,4 +179,5 @@ class IndirectLighting(Pass):
     def run(self, frame: Frame, planned: Planned) -> None:
         program = frame.program(planned)
         frame.set(program, vpl_count=planned.facts.settings.rsm.samples)
+        set_cells(frame, program, planned.facts)
         frame.screen(planned, program)

@@ -6,6 +6,9 @@
 // with both cosines in it, so that patches seen edge-on — a sphere's inside, a corner — lose no light to the bound.
 
 #include "lib/math_lib.glsl"
+#if HAS_OCCUPANCY
+#include "lib/occupancy_lib.glsl"
+#endif
 
 struct Gathered {
     vec3 radiance;    // E/π: what a white Lambert surface reflects, W/(m²·sr)
@@ -26,6 +29,12 @@ Gathered gather_vpls(vec3 position_ws, vec3 n, vec3 ng)
         if (cos_p <= 0.0 || cos_g <= 0.0) {
             continue;
         }
+#if HAS_OCCUPANCY
+        if (cells_block(position_ws + ng * (CELL_CLEARANCE * cell_size),
+                        vpl.position_ws + vpl.normal_ws * (CELL_CLEARANCE * cell_size))) {
+            continue;
+        }
+#endif
         float cos_x = max(dot(w, n), 0.0);
         // Φ/A · K A/(1 + K A) without the area: Φ cos cos / (π d² + cos cos A).
         float product = cos_p * cos_x;
