@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from ..facts import Facts
 from ..frame import Frame
-from ..gpu_types import VPL
+from ..gpu_types import LIGHT_MESH, VPL
 from ..graph import Buffer, Optional, Pass, Planned, Texture, Uniform
 from ..passes.ao import AOBlur, AOGeneration
 from ..passes.brdf_tables import BRDFTables
@@ -48,6 +48,11 @@ def _bounce_off(facts: Facts) -> str | None:
     if not facts.settings.use_indirect_diffuse:
         return "indirect diffuse is switched off"
     return "bounces is 0" if facts.settings.bounces == 0 else None
+
+
+def _gather_defines(facts: Facts) -> dict[str, int]:
+    lamps = any(s.kind == LIGHT_MESH for s in facts.rig.sources)
+    return {"GATHER_SCALE": facts.settings.gather_scale, "MESH_LIGHTS": int(lamps)}
 
 
 class RSMFlux(Pass):
@@ -133,7 +138,7 @@ class InterpolatedIndirect(Pass):
 
     title = "RSM Interpolated Indirect Lighting Computation"
     figure = "RSM Interpolated Indirect Lighting Computation"
-    reads = ("vpls", Optional("occupancy"), "gbuffer.low_depth", "gbuffer.low_normal", "gbuffer.low_pixel")
+    reads = ("vpls", "rsm.lights", Optional("occupancy"), "gbuffer.low_depth", "gbuffer.low_normal", "gbuffer.low_pixel")
     writes = (
         Texture("indirect.low", "low_indirect", "radiance a white Lambert surface would reflect, W/(m²·sr)", "rgba32f",
                 gather_size, scratch=True),
@@ -144,7 +149,7 @@ class InterpolatedIndirect(Pass):
     shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/rsm/gather_low_frag.glsl"}}
 
     def defines(self, facts: Facts) -> dict[str, int]:
-        return {"GATHER_SCALE": facts.settings.gather_scale}
+        return _gather_defines(facts)
 
     def absent(self, facts: Facts) -> str | None:
         return None if facts.settings.gather_scale > 1 else "every pixel gathers for itself"
@@ -162,7 +167,7 @@ class IndirectLighting(Pass):
     title = "RSM Lighting Computation"
     figure = "RSM Lighting Computation"
     reads = (
-        "vpls", Optional("occupancy"), "gbuffer.depth", "gbuffer.normal", Optional("gbuffer.low_depth"), Optional("gbuffer.low_normal"),
+        "vpls", "rsm.lights", Optional("occupancy"), "gbuffer.depth", "gbuffer.normal", Optional("gbuffer.low_depth"), Optional("gbuffer.low_normal"),
         Optional("gbuffer.low_pixel"), Optional("indirect.low"), Optional("indirect.low_direction"),
         Optional("ao"),
     )  # fmt: skip
@@ -174,7 +179,7 @@ class IndirectLighting(Pass):
     shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/rsm/lighting_frag.glsl"}}
 
     def defines(self, facts: Facts) -> dict[str, int]:
-        return {"GATHER_SCALE": facts.settings.gather_scale}
+        return _gather_defines(facts)
 
     def run(self, frame: Frame, planned: Planned) -> None:
         program = frame.program(planned)

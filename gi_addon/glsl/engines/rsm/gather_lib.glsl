@@ -9,6 +9,25 @@
 #if HAS_OCCUPANCY
 #include "lib/occupancy_lib.glsl"
 #endif
+#if HAS_OCCUPANCY && MESH_LIGHTS
+#include "generated/light.glsl"
+
+// Whether the triangle that lit a virtual light from one side hides it on the other: lamps hang closer to ceilings than any
+// cell is small. T. Möller and B. Trumbore, JGT 2(1), 1997.
+bool own_lamp_blocks(Light light, vec3 from_ws, vec3 to_ws)
+{
+    if (light.kind != LIGHT_MESH) {
+        return false;
+    }
+    vec3 d = to_ws - from_ws;
+    vec3 p = cross(d, light.v_ws);
+    float determinant = dot(light.u_ws, p);
+    vec3 s = from_ws - light.center_ws;
+    vec3 q = cross(s, light.u_ws);
+    vec3 hit = vec3(dot(s, p), dot(d, q), dot(light.v_ws, q)) / (abs(determinant) > 0.0 ? determinant : 1e30);
+    return hit.x >= 0.0 && hit.y >= 0.0 && hit.x + hit.y <= 1.0 && hit.z > 1e-4 && hit.z < 1.0 - 1e-4;
+}
+#endif
 
 struct Gathered {
     vec3 radiance;    // E/π: what a white Lambert surface reflects, W/(m²·sr)
@@ -29,6 +48,11 @@ Gathered gather_vpls(vec3 position_ws, vec3 n, vec3 ng)
         if (cos_p <= 0.0 || cos_g <= 0.0) {
             continue;
         }
+#if HAS_OCCUPANCY && MESH_LIGHTS
+        if (own_lamp_blocks(rsm_lights[vpl.light], vpl.position_ws, position_ws)) {
+            continue;
+        }
+#endif
 #if HAS_OCCUPANCY
         if (cells_block(position_ws + ng * (CELL_CLEARANCE * cell_size),
                         vpl.position_ws + vpl.normal_ws * (CELL_CLEARANCE * cell_size))) {
