@@ -2,9 +2,8 @@
 //
 // From cell to cell, or over the largest empty block around (J. Amanatides and A. Woo, "A Fast Voxel Traversal Algorithm
 // for Ray Tracing", Eurographics 1987, with the blocks of an octree). A surface fills every cell it passes through, so a
-// plane's cells reach √3/2 of an edge to either side of it: a ray that starts that far off its own surface never meets it.
+// plane's cells reach |nx| + |ny| + |nz| edges to either side of it: a ray that starts that far off never meets its own.
 
-const float CELL_CLEARANCE = 0.87;
 const int CELL_STEPS = 96;
 
 // How far (in cells) the ray may go from `p` within the block that `p` lies in, along `direction` (cells per unit).
@@ -14,6 +13,9 @@ float cell_exit(vec3 p, vec3 inverse, vec3 forward, float size)
     vec3 t = (corner + forward * size - p) * inverse;
     return min(t.x, min(t.y, t.z));
 }
+
+// A surface's point lifted clear of the cells that the surface fills.
+vec3 cells_clear(vec3 position_ws, vec3 n) { return position_ws + n * (dot(abs(n), vec3(1.0)) * cell_size); }
 
 // Whether something stands between two points, each already lifted off its own surface. A run of cells that holds an end
 // point is that point's own neighbourhood (a corner, a contact), not an obstacle: only what has free cells before and

@@ -37,6 +37,9 @@ struct Gathered {
 Gathered gather_vpls(vec3 position_ws, vec3 n, vec3 ng)
 {
     Gathered g = Gathered(vec3(0.0), vec4(0.0));
+#if HAS_OCCUPANCY
+    vec3 start_ws = cells_clear(position_ws, ng);
+#endif
     for (int i = 0; i < vpl_count; ++i) {
         Vpl vpl = vpls[i];
         vec3 d = vpl.position_ws - position_ws;
@@ -54,8 +57,7 @@ Gathered gather_vpls(vec3 position_ws, vec3 n, vec3 ng)
         }
 #endif
 #if HAS_OCCUPANCY
-        if (cells_block(position_ws + ng * (CELL_CLEARANCE * cell_size),
-                        vpl.position_ws + vpl.normal_ws * (CELL_CLEARANCE * cell_size))) {
+        if (cells_block(start_ws, cells_clear(vpl.position_ws, vpl.normal_ws))) {
             continue;
         }
 #endif
