@@ -19,6 +19,7 @@ from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentTint, _screen, gat
 from ..passes.lights import LightList, RSMGeneration, ShadowMaps
 from ..passes.occupancy import CELL_UNIFORMS, Occupancy, set_cells
 from ..passes.resolve import Resolve
+from ..passes.volumetric import MEDIUM_UNIFORMS, Volumetric, medium_defines, set_medium
 from ..settings import Settings
 
 
@@ -40,6 +41,7 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         InterpolatedIndirect(),
         IndirectLighting(),
         DirectLighting(),
+        Volumetric(),
         Resolve(layers),
     ]
 
@@ -52,7 +54,7 @@ def _bounce_off(facts: Facts) -> str | None:
 
 def _gather_defines(facts: Facts) -> dict[str, int]:
     lamps = any(s.kind == LIGHT_MESH for s in facts.rig.sources)
-    return {"GATHER_SCALE": facts.settings.gather_scale, "MESH_LIGHTS": int(lamps)}
+    return {"GATHER_SCALE": facts.settings.gather_scale, "MESH_LIGHTS": int(lamps), **medium_defines(facts)}
 
 
 class RSMFlux(Pass):
@@ -65,15 +67,19 @@ class RSMFlux(Pass):
                 lambda f: f.rig.bounce.size, mips=lambda f: max(f.rig.bounce.size).bit_length() - 1,
                 access="readwrite"),
     )  # fmt: skip
-    uniforms = (Uniform("tile", "int", "index of the view whose tile is filled"),)
+    uniforms = (Uniform("tile", "int", "index of the view whose tile is filled"), *MEDIUM_UNIFORMS)
     shaders = {
         "main": {"compute": "engines/rsm/flux_comp.glsl"},
         "reduce": {"compute": "engines/rsm/flux_reduce_comp.glsl"},
     }
     depends = ("lights", "world", "transforms", "meshes", "materials")
+    settings = ("use_volumetric", "volume.density")
 
     def rate(self, facts: Facts) -> str:
         return RSMGeneration().rate(facts)
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return medium_defines(facts)
 
     def absent(self, facts: Facts) -> str | None:
         return _bounce_off(facts)
@@ -83,6 +89,7 @@ class RSMFlux(Pass):
         maps = facts.rig.bounce
         flux = frame.resources["rsm.flux"]
         program = frame.program(planned)
+        set_medium(frame, program, facts)
         if planned.stale:
             # Texels outside every tile hold nothing.
             frame.pool.framebuffer([flux]).clear(0.0, 0.0, 0.0, 0.0)
@@ -117,13 +124,18 @@ class RSMSamplingPattern(Pass):
         Uniform("vpl_count", "int", "how many to draw"),
         Uniform("view_count", "int", "views in the list"),
         Uniform("levels", "int", "levels of the flux pyramid above the texels"),
+        *MEDIUM_UNIFORMS,
     )
     shaders = {"main": {"compute": "engines/rsm/vpls_comp.glsl"}}
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return medium_defines(facts)
 
     def run(self, frame: Frame, planned: Planned) -> None:
         program = frame.program(planned)
         facts = planned.facts
         count = facts.settings.rsm.samples
+        set_medium(frame, program, facts)
         frame.set(
             program,
             vpl_count=count,
@@ -145,7 +157,7 @@ class InterpolatedIndirect(Pass):
         Texture("indirect.low_direction", "low_direction", "Σ luminance × direction, and Σ luminance, of what arrives",
                 "rgba32f", gather_size, scratch=True),
     )  # fmt: skip
-    uniforms = (Uniform("vpl_count", "int", "virtual point lights in the list"), *CELL_UNIFORMS)
+    uniforms = (Uniform("vpl_count", "int", "virtual point lights in the list"), *CELL_UNIFORMS, *MEDIUM_UNIFORMS)
     shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/rsm/gather_low_frag.glsl"}}
 
     def defines(self, facts: Facts) -> dict[str, int]:
@@ -158,6 +170,7 @@ class InterpolatedIndirect(Pass):
         program = frame.program(planned)
         frame.set(program, vpl_count=planned.facts.settings.rsm.samples)
         set_cells(frame, program, planned.facts)
+        set_medium(frame, program, planned.facts)
         frame.screen(planned, program)
 
 
@@ -175,7 +188,7 @@ class IndirectLighting(Pass):
         Texture("indirect.diffuse", "indirect_diffuse", "radiance a white Lambert surface would reflect, W/(m²·sr)",
                 "rgba32f", _screen, when=lambda f: None if f.diffuse else "no visible material is diffuse"),
     )  # fmt: skip
-    uniforms = (Uniform("vpl_count", "int", "virtual point lights in the list"), *CELL_UNIFORMS)
+    uniforms = (Uniform("vpl_count", "int", "virtual point lights in the list"), *CELL_UNIFORMS, *MEDIUM_UNIFORMS)
     shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/rsm/lighting_frag.glsl"}}
 
     def defines(self, facts: Facts) -> dict[str, int]:
@@ -185,4 +198,5 @@ class IndirectLighting(Pass):
         program = frame.program(planned)
         frame.set(program, vpl_count=planned.facts.settings.rsm.samples)
         set_cells(frame, program, planned.facts)
+        set_medium(frame, program, planned.facts)
         frame.screen(planned, program)

@@ -6,6 +6,9 @@
 // with both cosines in it, so that patches seen edge-on — a sphere's inside, a corner — lose no light to the bound.
 
 #include "lib/math_lib.glsl"
+#if HAS_MEDIUM
+#include "lib/medium_lib.glsl"
+#endif
 #if HAS_OCCUPANCY
 #include "lib/occupancy_lib.glsl"
 #endif
@@ -65,9 +68,13 @@ Gathered gather_vpls(vec3 position_ws, vec3 n, vec3 ng)
         // Φ/A · K A/(1 + K A) without the area: Φ cos cos / (π d² + cos cos A).
         float product = cos_p * cos_x;
         float kernel = product / (PI * d2 + product * vpl.area);
-        g.radiance += vpl.flux * kernel;
+        vec3 flux = vpl.flux;
+#if HAS_MEDIUM
+        flux *= medium_transmittance(position_ws, w, sqrt(d2));
+#endif
+        g.radiance += flux * kernel;
         // Light per direction, by the same bound but for the receiver's own cosine.
-        float arriving = luminance(vpl.flux) * cos_p / (PI * d2 + cos_p * vpl.area);
+        float arriving = luminance(flux) * cos_p / (PI * d2 + cos_p * vpl.area);
         g.direction += vec4(w, 1.0) * arriving;
     }
     g.radiance *= INV_PI;
