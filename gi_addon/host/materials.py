@@ -35,10 +35,11 @@ _PARAMS: dict[str, tuple[str, ...]] = {
                 "sun_elevation", "sun_rotation", "altitude", "air_density", "dust_density", "aerosol_density",
                 "ozone_density"),
     "VECTOR_ROTATE": ("rotation_type", "invert"), "VECT_TRANSFORM": ("vector_type", "convert_from", "convert_to"),
-    "SUBSURFACE_SCATTERING": ("falloff",),
+    "SUBSURFACE_SCATTERING": ("falloff",), "TANGENT": ("direction_type", "axis", "uv_map"),
 }  # fmt: skip
 
-_CURVE_ENTRIES = 257  # rows of a sampled ramp or curve: Cycles samples them at 256
+_CURVE_ENTRIES = 256  # rows of a sampled ramp or curve, as many as Cycles takes
+_PCG = bpy.app.version >= (5, 0, 0)  # how this Blender hashes Voronoi cells
 
 
 class ImageTable:
@@ -174,7 +175,11 @@ class GraphReader:
         elif node.type == "NORMAL":
             params["normal"] = tuple(node.outputs[0].default_value)
         elif node.type == "TEX_COORD":
-            params["object"] = bool(node.object)
+            if node.object is not None:
+                matrix = node.object.matrix_world.inverted_safe()
+                params["object_matrix"] = [tuple(float(v) for v in matrix[r]) for r in range(3)]
+        elif node.type == "TEX_VORONOI":
+            params["pcg"] = _PCG
         elif node.type == "VALTORGB":
             ramp = node.color_ramp
             params["table"] = [tuple(ramp.evaluate(i / (_CURVE_ENTRIES - 1))) for i in range(_CURVE_ENTRIES)]
@@ -217,22 +222,19 @@ def _plain(value: Any, *, color: bool = False) -> Any:
 
 
 def _curves(node: bpy.types.Node) -> dict[str, Any]:
+    """Samples between the first and the last point of all curves; ``extend``: they go on straight beyond."""
     mapping = node.mapping
     mapping.initialize()
-    low, high = (mapping.clip_min_x, mapping.clip_max_x) if mapping.use_clip else (-1.0, 1.0)
-    if node.type != "CURVE_VEC" and mapping.use_clip is False:
-        low, high = 0.0, 1.0
-    xs = [low + (high - low) * i / (_CURVE_ENTRIES - 1) for i in range(_CURVE_ENTRIES)]
-    curves = mapping.curves
+    curves = mapping.curves[:1] if node.type == "CURVE_FLOAT" else mapping.curves[:]
+    low = min(curve.points[0].location[0] for curve in curves)
+    high = max(curve.points[-1].location[0] for curve in curves)
     rows = []
-    for x in xs:
-        if node.type == "CURVE_FLOAT":
-            rows.append((mapping.evaluate(curves[0], x), 0.0, 0.0, 0.0))
-        elif node.type == "CURVE_VEC":
-            rows.append((*(mapping.evaluate(curves[k], x) for k in range(3)), 0.0))
-        else:  # the combined curve comes first
-            rows.append((*(mapping.evaluate(curves[k], mapping.evaluate(curves[3], x)) for k in range(3)), 0.0))
-    return {"table": rows, "range": (low, high)}
+    for i in range(_CURVE_ENTRIES):
+        x = low + (high - low) * i / (_CURVE_ENTRIES - 1)
+        if node.type == "CURVE_RGB":  # the combined curve comes first
+            x = mapping.evaluate(curves[3], x)
+        rows.append(tuple(mapping.evaluate(curve, x) for curve in curves[:3]))
+    return {"table": rows, "range": (low, high), "extend": mapping.extend == "EXTRAPOLATED"}
 
 
 def _texture_mapping(mapping) -> list[tuple[float, ...]] | None:

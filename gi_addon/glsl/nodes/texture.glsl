@@ -27,42 +27,54 @@ vec4 node_image(sampler2D image, vec2 uv, int encoded, int extension)
     return c;
 }
 
-vec4 node_image_box(sampler2D image, vec3 co, vec3 n, float blend, int encoded, int extension)
+// Weights of a box's three sides, as Blender blends them: |n| as barycentric coordinates, whose triangle has a corner per
+// side, seams of width `blend` between two and, in the middle, a triangle where all three meet.
+vec3 box_weights(vec3 n, float blend)
 {
-    vec3 w = abs(n) / max(dot(abs(n), vec3(1.0)), 1e-6);
-    // Weights of the three sides; `blend` widens the seam between them.
+    n = abs(n) / max(dot(abs(n), vec3(1.0)), 1e-6);
     float limit = 0.5 * (1.0 + blend);
-    vec3 weight;
-    if (w.x > limit * (w.x + w.y) && w.x > limit * (w.x + w.z)) {
-        weight = vec3(1.0, 0.0, 0.0);
-    } else if (w.y > limit * (w.x + w.y) && w.y > limit * (w.y + w.z)) {
-        weight = vec3(0.0, 1.0, 0.0);
-    } else if (w.z > limit * (w.x + w.z) && w.z > limit * (w.y + w.z)) {
-        weight = vec3(0.0, 0.0, 1.0);
-    } else if (blend > 0.0) {
-        float low = 0.5 * (1.0 - blend);
-        weight = max(w - low * max3(w), vec3(0.0));
-        weight = w * w * w;
-        weight /= max(dot(weight, vec3(1.0)), 1e-6);
-    } else {
-        weight = vec3(greaterThanEqual(w, vec3(max3(w))));
-        weight /= dot(weight, vec3(1.0));
+    if (n.x > limit * (n.x + n.y) && n.x > limit * (n.x + n.z)) {
+        return vec3(1.0, 0.0, 0.0);
     }
-    vec4 c = vec4(0.0);
-    if (weight.x > 0.0) {
-        c += weight.x * node_image(image, n.x < 0.0 ? vec2(1.0 - co.y, co.z) : co.yz, encoded, extension);
+    if (n.y > limit * (n.x + n.y) && n.y > limit * (n.y + n.z)) {
+        return vec3(0.0, 1.0, 0.0);
     }
-    if (weight.y > 0.0) {
-        c += weight.y * node_image(image, n.y > 0.0 ? vec2(1.0 - co.x, co.z) : co.xz, encoded, extension);
+    if (n.z > limit * (n.x + n.z) && n.z > limit * (n.y + n.z)) {
+        return vec3(0.0, 0.0, 1.0);
     }
-    if (weight.z > 0.0) {
-        c += weight.z * node_image(image, n.z > 0.0 ? vec2(1.0 - co.y, co.x) : co.yx, encoded, extension);
+    if (blend <= 0.0) {
+        return vec3(1.0, 0.0, 0.0);
     }
-    return c;
+    float low = 0.5 * (1.0 - blend);
+    if (n.z < (1.0 - limit) * (n.y + n.x)) {
+        float w = saturate((n.x / (n.x + n.y) - low) / blend);
+        return vec3(w, 1.0 - w, 0.0);
+    }
+    if (n.x < (1.0 - limit) * (n.y + n.z)) {
+        float w = saturate((n.y / (n.y + n.z) - low) / blend);
+        return vec3(0.0, w, 1.0 - w);
+    }
+    if (n.y < (1.0 - limit) * (n.x + n.z)) {
+        float w = saturate((n.x / (n.x + n.z) - low) / blend);
+        return vec3(w, 0.0, 1.0 - w);
+    }
+    return ((2.0 - limit) * n + (limit - 1.0)) / (2.0 * limit - 1.0);
 }
 
+vec4 node_image_box(sampler2D image, vec3 co, vec3 n, float blend, int encoded, int extension)
+{
+    vec3 weight = box_weights(n, blend);
+    // All three are looked up everywhere: derivatives have no meaning where neighbours take other branches.
+    vec4 x = node_image(image, vec2(n.x < 0.0 ? 1.0 - co.y : co.y, co.z), encoded, extension);
+    vec4 y = node_image(image, vec2(n.y > 0.0 ? 1.0 - co.x : co.x, co.z), encoded, extension);
+    vec4 z = node_image(image, vec2(n.z > 0.0 ? 1.0 - co.y : co.y, co.x), encoded, extension);
+    return weight.x * x + weight.y * y + weight.z * z;
+}
+
+// Blender's sphere and tube stand in the middle of the unit cube of coordinates.
 vec2 node_map_to_sphere(vec3 co)
 {
+    co = 2.0 * co - 1.0;
     float l = length(co);
     if (l == 0.0) {
         return vec2(0.0);
@@ -72,6 +84,7 @@ vec2 node_map_to_sphere(vec3 co)
 }
 vec2 node_map_to_tube(vec3 co)
 {
+    co = 2.0 * co - 1.0;
     float l = length(co.xy);
     return l > 0.0 ? vec2((1.0 - atan(co.x / l, co.y / l) * INV_PI) * 0.5, (co.z + 1.0) * 0.5) : vec2(0.0);
 }
