@@ -409,3 +409,87 @@ def test_inputs_are_cycles_own(blender, gl):
     grid.color("tangent uv", case("Tangent", "Tangent", direction_type="UV_MAP"))
     # Cycles smooths a UV map's tangent over the two triangles of the bent tile.
     check(grid, "inputs", **{"tangent uv": 0.06})
+
+
+# --- images -----------------------------------------------------------------------------------------------------------
+
+
+def picture(bpy, name: str, color_space: str = "Non-Color", size: int = 5):
+    image = bpy.data.images.get(name) or bpy.data.images.new(name, size, size, alpha=True)
+    image.colorspace_settings.name = color_space
+    y, x = np.mgrid[0:size, 0:size] / (size - 1)
+    pixels = np.stack([x, y, 0.5 + 0.5 * np.sin(9 * x + 5 * y), 0.3 + 0.7 * x * y], -1)
+    image.pixels.foreach_set(np.ascontiguousarray(pixels, "f4").ravel())
+    image.update()
+    image.pack()
+    return image
+
+
+def image_case(bpy, output: str = "Color", source=None, **settings):
+    """A maker of an image texture; its picture is made with the scene, of few texels, so that none is smaller than a pixel."""
+
+    def maker(tree):
+        space = settings.get("space", "Non-Color")
+        image = picture(bpy, f"picture {space}", space)
+        image.alpha_mode = settings.get("alpha", "CHANNEL_PACKED")
+        node = {k: v for k, v in settings.items() if k not in ("space", "alpha")}
+        vector = (source or coordinate("UV", 1.7, (-0.331, -0.217, 0.0)))(tree)
+        return make(tree, "TexImage", output, {"Vector": vector}, image=image, **node)
+
+    return maker
+
+
+def test_images_by_extension_interpolation_projection_and_colour_space(blender, gl):
+    grid = Grid(blender)
+    for extension in ("REPEAT", "EXTEND", "CLIP", "MIRROR"):
+        grid.color(f"{extension}", image_case(blender, extension=extension))
+    grid.number("clipped alpha", image_case(blender, "Alpha", extension="CLIP"))
+    for interpolation in ("Closest", "Cubic", "Smart"):
+        grid.color(interpolation, image_case(blender, interpolation=interpolation))
+    for space in ("sRGB", "Linear Rec.709"):
+        grid.color(space, image_case(blender, space=space))
+    solid = coordinate("Object", 0.83, (0.5, 0.5, 0.31))
+    for projection in ("SPHERE", "TUBE", "BOX"):
+        source = solid if projection == "BOX" else coordinate("Object", 0.4, (1.1, 0.9, 0.6))  # off the poles
+        grid.color(projection, image_case(blender, source=source, projection=projection, projection_blend=0.4))
+    for projection in ("EQUIRECTANGULAR", "MIRROR_BALL"):
+
+        def environment(tree, projection=projection):
+            return make(tree, "TexEnvironment", "Color", {"Vector": coordinate("Object", 2.0, (0.3, 0.4, 0.5))(tree)},
+                        image=picture(blender, "sky"), projection=projection)  # fmt: skip
+
+        grid.color(projection, environment)
+    # Eight-bit texels between which GPUs interpolate with eight bits of fraction.
+    check(grid, "images", 0.01)
+
+
+def test_udim_tiles_are_told_apart(blender, gl, tmp_path):
+    """Two tiles side by side and a gap, which is magenta; from files."""
+    bpy = blender
+    grid = Grid(bpy)
+
+    def tiled(tree):
+        for number, shift in ((1001, 0.0), (1003, 0.4), (1012, 0.8)):
+            image = picture(bpy, f"tile{number}", size=3)
+            pixels = np.empty(len(image.pixels), "f4")
+            image.pixels.foreach_get(pixels)
+            image.pixels.foreach_set(np.abs(pixels - shift).astype("f4"))
+            image.filepath_raw, image.file_format = str(tmp_path / f"t.{number}.png"), "PNG"
+            image.save()
+        image = bpy.data.images.load(str(tmp_path / "t.1001.png"))
+        image.source, image.filepath = "TILED", str(tmp_path / "t.<UDIM>.png")
+        image.colorspace_settings.name = "Non-Color"
+        for number in (1003, 1012):
+            if number not in [t.number for t in image.tiles]:
+                image.tiles.new(number)
+        return make(tree, "TexImage", "Color", {"Vector": coordinate("UV", 2.9, (0.02, 0.02, 0.0))(tree)}, image=image)
+
+    grid.color("udim", tiled)
+    scene, groups, _ = grid.build()
+    test, reference = both(scene)
+    pictures_to("nodes", "udim", test=test, reference=reference)
+    # Tiles' borders blend differently: a pixel's width of each.
+    assert np.percentile(np.abs(test - reference), 80) < 0.01
+    magenta = np.abs(test - (1.25, 1.0, 1.25)).max(-1) < 1e-3
+    assert (magenta == (np.abs(reference - (1.25, 1.0, 1.25)).max(-1) < 1e-3)).mean() > 0.9
+    assert magenta.any() and not magenta.all()

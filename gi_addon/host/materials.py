@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import os
+import tempfile
 from collections.abc import Iterator
 from typing import Any
 
@@ -39,6 +41,7 @@ _PARAMS: dict[str, tuple[str, ...]] = {
 }  # fmt: skip
 
 _CURVE_ENTRIES = 256  # rows of a sampled ramp or curve, as many as Cycles takes
+_ATLAS_LIMIT = 8192  # texels a side of all tiles of an image together
 _PCG = bpy.app.version >= (5, 0, 0)  # how this Blender hashes Voronoi cells
 
 
@@ -66,14 +69,11 @@ class ImageTable:
         cached = self._cache.get(key)
         if cached and cached[0] == stamp and not image.is_dirty and image.source != "SEQUENCE":
             return cached[1]
-        width, height = image.size
-        if width * height == 0 or image.channels == 0:
+        pixels = self._tiles(image) if image.source == "TILED" else self._pixels(image)
+        if pixels is None:
             where = bpy.path.abspath(image.filepath) or "no file"
             self._notes.append(f"image {image.name} of {owner} can't be read ({where}); it shows magenta")
             return Image.placeholder(image.name)
-        pixels = np.empty(width * height * 4, np.float32)
-        image.pixels.foreach_get(pixels)
-        pixels = pixels.reshape(height, width, 4)
         name = image.colorspace_settings.name
         space = "data" if name in _DATA else "srgb" if name in _SRGB else "linear"
         if not image.is_float:
@@ -86,6 +86,70 @@ class ImageTable:
         result = Image(image.name, pixels, space)
         self._cache[key] = (stamp, result)
         return result
+
+
+    @staticmethod
+    def _pixels(image: bpy.types.Image) -> np.ndarray | None:
+        """Pixels (H, W, 4) f4, None where there are none."""
+        width, height = image.size
+        if width * height == 0 or image.channels == 0:
+            return None
+        pixels = np.empty(width * height * 4, np.float32)
+        image.pixels.foreach_get(pixels)
+        return pixels.reshape(height, width, 4)
+
+    def _tiles(self, image: bpy.types.Image) -> np.ndarray | None:
+        """All UDIM tiles in one picture, laid out as in UV space; see :func:`tile_grid`. Blender shows scripts the first
+        tile alone, so the others are loaded from their files; a missing one is magenta."""
+        column, row, columns, rows = tile_grid(image)
+        parts = {tile.number: self._tile(image, tile) for tile in image.tiles}
+        sizes = [p.shape[:2] for p in parts.values() if p is not None]
+        if not sizes:
+            return None
+        height, width = np.max(sizes, axis=0)
+        step = max(1, -(-max(width * columns, height * rows) // _ATLAS_LIMIT))
+        height, width = -(-height // step), -(-width // step)
+        atlas = np.empty((rows * height, columns * width, 4), np.float32)
+        atlas[:] = (1.0, 0.0, 1.0, 1.0)
+        for number, part in parts.items():
+            if part is None:
+                self._notes.append(f"tile {number} of image {image.name} can't be read; it shows magenta")
+                continue
+            y, x = (np.arange(n) * m // n for n, m in zip((height, width), part.shape[:2], strict=True))
+            at_x, at_y = (number - 1001) % 10 - column, (number - 1001) // 10 - row
+            atlas[at_y * height : (at_y + 1) * height, at_x * width : (at_x + 1) * width] = part[np.ix_(y, x)]
+        return atlas
+
+    def _tile(self, image: bpy.types.Image, tile) -> np.ndarray | None:
+        if tile.number == image.tiles[0].number and image.size[0]:
+            return self._pixels(image)
+        x, y = (tile.number - 1001) % 10 + 1, (tile.number - 1001) // 10 + 1
+        path = bpy.path.abspath(image.filepath_raw, library=image.library)
+        path = path.replace("<UDIM>", str(tile.number)).replace("<UVTILE>", f"u{x}_v{y}")
+        with tempfile.TemporaryDirectory(prefix="quartet-") as folder:
+            packed = next((p for p in image.packed_files if p.tile_number == tile.number), None)
+            if packed is not None:
+                path = os.path.join(folder, os.path.basename(path))
+                with open(path, "wb") as file:
+                    file.write(packed.data)
+            if not os.path.isfile(path):
+                return None
+            try:
+                loaded = bpy.data.images.load(path)
+            except RuntimeError:
+                return None
+            try:
+                loaded.colorspace_settings.name = image.colorspace_settings.name
+                return self._pixels(loaded)
+            finally:
+                bpy.data.images.remove(loaded)
+
+
+def tile_grid(image: bpy.types.Image) -> tuple[int, int, int, int]:
+    """(first column, first row, columns, rows) that a tiled image's UDIM numbers span."""
+    at = [((tile.number - 1001) % 10, (tile.number - 1001) // 10) for tile in image.tiles]
+    low, high = np.min(at, axis=0), np.max(at, axis=0)
+    return (int(low[0]), int(low[1]), *(int(v) for v in high - low + 1))
 
 
 class GraphReader:
@@ -167,6 +231,8 @@ class GraphReader:
         if node.type in ("TEX_IMAGE", "TEX_ENVIRONMENT"):
             params["image"] = self.images.index(node.image, self.owner)
             if node.image is not None:
+                if node.image.source == "TILED":
+                    params["tiles"] = tile_grid(node.image)
                 params["alpha_mode"] = {"PREMUL": "PREMUL", "NONE": "NONE"}.get(node.image.alpha_mode, "STRAIGHT")
         if node.type == "RGB":
             params["value"] = tuple(node.outputs[0].default_value[:3])

@@ -403,15 +403,21 @@ def image_texture(c: Compiler, n: Node) -> dict[str, Value]:
     projection = n.params.get("projection", "FLAT")
     encoded, opaque = c.image_flags(index)
     extension = ("REPEAT", "EXTEND", "CLIP", "MIRROR").index(n.params.get("extension", "REPEAT"))
+    if extension == 2 and n.params.get("interpolation") == "Closest":
+        extension = 4
     flags = f"{int(encoded)}, {extension}"
-    projection = n.params.get("projection", "FLAT")
     if projection == "BOX":
         blend = c.constant(n.params.get("projection_blend", 0.0), FLOAT)
         text = f"node_image_box({sampler}, {co}, point.normal_os, {blend.text}, {flags})"
     else:
         co = {"SPHERE": f"node_map_to_sphere({co})", "TUBE": f"node_map_to_tube({co})"}.get(projection, f"({co}).xy")
-        text = f"node_image({sampler}, {co}, {flags})"
-    return _texel(c, n, text, opaque and extension != 2)
+        cubic = n.params.get("interpolation") in ("Cubic", "Smart")
+        kind = "" if projection == "FLAT" else "_around"
+        text = f"node_image{'_cubic' if cubic else kind}({sampler}, {co}, {flags})"
+        if n.params.get("tiles"):
+            grid = ", ".join(f"{float(v)}" for v in n.params["tiles"])
+            text = f"node_image_tiled({sampler}, {co}, vec4({grid}), {int(encoded)})"
+    return _texel(c, n, text, opaque and extension not in (2, 4))
 
 
 def _texel(c: Compiler, n: Node, text: str, opaque: bool) -> dict[str, Value]:
@@ -431,7 +437,7 @@ def environment_texture(c: Compiler, n: Node) -> dict[str, Value]:
     sampler = c.image(index, n.params.get("interpolation", "Linear"), "REPEAT")
     mapping = "node_direction_to_mirror_ball" if n.params.get("projection") == "MIRROR_BALL" else "node_equirect"
     encoded, opaque = c.image_flags(index)
-    return _texel(c, n, f"node_image({sampler}, {mapping}({co}), {int(encoded)}, 0)", opaque)
+    return _texel(c, n, f"node_image_around({sampler}, {mapping}({co}), {int(encoded)}, 0)", opaque)
 
 
 @node("TEX_CHECKER")

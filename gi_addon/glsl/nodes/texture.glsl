@@ -6,7 +6,18 @@ vec3 srgb_decode(vec3 c)
 }
 
 // encoded: the texels are sRGB bytes, decoded after they are filtered, as Cycles does.
-// extension: 0 repeat, 1 extend, 2 clip, 3 mirror.
+// extension: 0 repeat, 1 extend, 2 clip, 3 mirror, 4 clip between texels.
+
+// What is left of a clipped look-up: texels outside are nothing, so the outermost fade over their own width.
+float image_coverage(vec2 uv, vec2 size, int extension)
+{
+    if (extension == 2) {
+        vec2 inside = clamp(uv * size + 0.5, 0.0, 1.0) * clamp((1.0 - uv) * size + 0.5, 0.0, 1.0);
+        return inside.x * inside.y;
+    }
+    return extension == 4 && (any(lessThan(uv, vec2(0.0))) || any(greaterThan(uv, vec2(1.0)))) ? 0.0 : 1.0;
+}
+
 vec4 node_image(sampler2D image, vec2 uv, int encoded, int extension)
 {
     if (extension == 3) {
@@ -21,10 +32,66 @@ vec4 node_image(sampler2D image, vec2 uv, int encoded, int extension)
     if (encoded != 0) {
         c.rgb = srgb_decode(c.rgb);
     }
-    if (extension == 2 && (any(lessThan(uv, vec2(0.0))) || any(greaterThan(uv, vec2(1.0))))) {
-        return vec4(0.0);
+    return c * image_coverage(uv, vec2(textureSize(image, 0)), extension);
+}
+
+// Cubic B-spline by four bilinear taps: C. Sigg and M. Hadwiger, "Fast Third-Order Texture Filtering", GPU Gems 2, 2005.
+// Where texels are smaller than pixels the mipmaps' mean is as smooth.
+vec4 node_image_cubic(sampler2D image, vec2 uv, int encoded, int extension)
+{
+#if SURFACE_IMPLICIT_LOD
+    vec4 plain = node_image(image, uv, encoded, extension);
+    if (textureQueryLod(image, uv).x > 0.0) {
+        return plain;
     }
-    return c;
+#endif
+    vec2 size = vec2(textureSize(image, 0));
+    vec2 at = (extension == 3 ? 1.0 - abs(1.0 - fract(uv * 0.5) * 2.0) : uv) * size - 0.5;
+    vec2 f = fract(at);
+    at -= f;
+    vec2 w0 = (1.0 - f) * (1.0 - f) * (1.0 - f) / 6.0;
+    vec2 w1 = 2.0 / 3.0 - 0.5 * f * f * (2.0 - f);
+    vec2 w2 = 2.0 / 3.0 - 0.5 * (1.0 - f) * (1.0 - f) * (1.0 + f);
+    vec2 w3 = f * f * f / 6.0;
+    vec2 low = (at - 0.5 + w1 / (w0 + w1)) / size;
+    vec2 high = (at + 1.5 + w3 / (w2 + w3)) / size;
+    vec2 share = w2 + w3;
+    vec4 bottom = mix(textureLod(image, low, 0.0), textureLod(image, vec2(high.x, low.y), 0.0), share.x);
+    vec4 top = mix(textureLod(image, vec2(low.x, high.y), 0.0), textureLod(image, high, 0.0), share.x);
+    vec4 c = mix(bottom, top, share.y);
+    if (encoded != 0) {
+        c.rgb = srgb_decode(c.rgb);
+    }
+    return c * image_coverage(uv, size, extension);
+}
+
+// Around a seam in u, where a coordinate jumps by one: derivatives of the two ways around, the smaller of them counts.
+vec4 node_image_around(sampler2D image, vec2 uv, int encoded, int extension)
+{
+#if SURFACE_IMPLICIT_LOD
+    float other = fract(uv.x + 0.5);
+    vec2 dx = dFdx(uv);
+    vec2 dy = dFdy(uv);
+    dx.x = abs(dFdx(other)) < abs(dx.x) ? dFdx(other) : dx.x;
+    dy.x = abs(dFdy(other)) < abs(dy.x) ? dFdy(other) : dy.x;
+    float sharper = exp2(view.lod_bias);
+    vec4 c = textureGrad(image, uv, dx * sharper, dy * sharper);
+    if (encoded != 0) {
+        c.rgb = srgb_decode(c.rgb);
+    }
+    return c * image_coverage(uv, vec2(textureSize(image, 0)), extension);
+#else
+    return node_image(image, uv, encoded, extension);
+#endif
+}
+
+// UDIM tiles lie in one image as they do in UV space; `grid` is (first column, first row, columns, rows). Beyond them is
+// Blender's magenta.
+vec4 node_image_tiled(sampler2D image, vec2 uv, vec4 grid, int encoded)
+{
+    vec2 at = (uv - grid.xy) / grid.zw;
+    vec4 c = node_image(image, at, encoded, 1);
+    return any(lessThan(at, vec2(0.0))) || any(greaterThanEqual(at, vec2(1.0))) ? vec4(1.0, 0.0, 1.0, 1.0) : c;
 }
 
 // Weights of a box's three sides, as Blender blends them: |n| as barycentric coordinates, whose triangle has a corner per

@@ -39,7 +39,7 @@ SurfacePoint surface_point(vec3 view_ws)
     p.position_vs = vec3(1.0, 1.0, -1.0) * (view.view_from_world * vec4(vary_position_ws, 1.0)).xyz;
 #if SURFACE_OBJECT_SPACE
     p.position_os = vary_position_os;
-    p.normal_os = safe_normalize(vary_normal_os);
+    p.normal_os = safe_normalize(vary_normal_os) * (1.0 - 2.0 * p.backfacing);
     p.generated = vary_generated;
     p.object_location = vary_location;
     p.object_color = vary_color;
