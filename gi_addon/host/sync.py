@@ -124,7 +124,7 @@ class SceneSync:
             slots = [slot.material for slot in obj.material_slots] or list(getattr(obj.data, "materials", []))
             visibility = _visibility(obj)
             placed.add(index, matrix, tuple(materials.index(m) for m in slots) or (materials.index(None),),
-                       visibility, instance.random_id / 2**32, obj.pass_index, tuple(obj.color))  # fmt: skip
+                       visibility, _random(instance, obj), obj.pass_index, tuple(obj.color))  # fmt: skip
         self._meshes = {k: v for k, v in self._meshes.items() if k in used_keys}
         scene.instances = placed.instances()
         if self._world is None:
@@ -227,6 +227,30 @@ class _Placed:
 def _note(scene: Scene, text: str) -> None:
     if text not in scene.notes:
         scene.notes.append(text)
+
+
+def _random(instance: bpy.types.DepsgraphObjectInstance, obj: bpy.types.Object) -> float:
+    """Object Info's Random in [0, 1]: Blender's own number for instances, for others Cycles' hash of the name."""
+    if instance.is_instance:
+        return instance.random_id / 0xFFFFFFFF
+    key = 0
+    for byte in obj.name.encode():
+        key = (key * 37 + byte) & 0xFFFFFFFF
+    return _lookup3(key, 0) / 0xFFFFFFFF
+
+
+def _lookup3(x: int, y: int) -> int:
+    """R. Jenkins' lookup3 of two 32-bit words, as in ``glsl/nodes/hash.glsl``."""
+    mask = 0xFFFFFFFF
+
+    def rotated(v: int, k: int) -> int:
+        return (v << k | v >> (32 - k)) & mask
+
+    c = 0xDEADBEEF + (2 << 2) + 13
+    v = [(c + x) & mask, (c + y) & mask, c & mask]
+    for target, source, k in ((2, 1, 14), (0, 2, 11), (1, 0, 25), (2, 1, 16), (0, 2, 4), (1, 0, 14), (2, 1, 24)):
+        v[target] = ((v[target] ^ v[source]) - rotated(v[source], k)) & mask
+    return v[2]
 
 
 def _visibility(obj: bpy.types.Object) -> int:
