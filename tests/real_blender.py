@@ -151,9 +151,12 @@ def run(script: str, tmp_path: Path, *options: str, timeout: int = 600) -> dict:
     code = _PREAMBLE.format(paths=paths, report=str(answer)) + script
     path = tmp_path / "script.py"
     path.write_text(code)
+    # That program has another Mesa than this machine: two of them in one shader cache end in a bus error now and then.
+    cache = CACHE / "mesa"
+    cache.mkdir(parents=True, exist_ok=True)
     done = subprocess.run(
         [str(TOOL), *options, "--factory-startup", "--python-exit-code", "1", "-P", str(path)],
-        capture_output=True, text=True, timeout=timeout,
+        capture_output=True, text=True, timeout=timeout, env={**os.environ, "MESA_SHADER_CACHE_DIR": str(cache)},
     )  # fmt: skip
     if not answer.exists():
         pytest.fail(f"Blender gave no report (exit {done.returncode}):\n{done.stdout[-4000:]}\n{done.stderr[-4000:]}")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from ..gl.context import MIB
 from ..graph import Plan
@@ -40,7 +40,6 @@ class Report:
     skipped: tuple[tuple[str, str], ...]
     mib: float
     notes: tuple[str, ...] = ()
-    counts: dict[str, int] = field(default_factory=dict)
 
 
 # The last frame of each kind, ``viewport`` and ``final``; why there is no picture, if there is none.
@@ -50,9 +49,8 @@ _log: deque[str] = deque(maxlen=_LOG_LINES)
 
 
 def summarise(
-    kind: str, plan: Plan, subframes: int, seconds: float, milliseconds: dict[str, list[float]],
-    notes: list[str], counts: dict[str, int] | None = None,
-) -> Report:  # fmt: skip
+    kind: str, plan: Plan, subframes: int, seconds: float, milliseconds: dict[str, list[float]], notes: list[str]
+) -> Report:
     """A Report of a plan that ran; keeps nothing of the scene alive."""
     facts = plan.facts
     rows = []
@@ -64,7 +62,7 @@ def summarise(
         ))  # fmt: skip
     skipped = tuple((task.title, reason) for task, reason in plan.skipped)
     return Report(kind, facts.settings.technique, facts.resolution, subframes, seconds, tuple(rows), skipped,
-                  plan.nbytes() / MIB, tuple(notes), dict(counts or {}))  # fmt: skip
+                  plan.nbytes() / MIB, tuple(notes))  # fmt: skip
 
 
 def publish(report: Report) -> None:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import contextlib
 import time
 import weakref
+from collections import Counter
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as NotYet
 from dataclasses import dataclass, replace
@@ -70,6 +71,7 @@ class Picture:
     pixels: np.ndarray
     first: float
     report: status.Report
+    sent: frozenset[str] = frozenset()  # kinds of data that went to the GPU for it
 
 
 class Viewport:
@@ -95,7 +97,7 @@ class Viewport:
         self._renderer: Renderer | None = None
         self._next: tuple | None = None
         # What there was to do, for the tests and the update matrix of the docs.
-        self.counts = {"updates": 0, "reads": 0, "restarts": 0, "subframes": 0, "draws": 0}
+        self.counts = Counter()
         _live.add(self)
 
     # -- Blender's calls -----------------------------------------------------------------------------------------
@@ -241,10 +243,11 @@ class Viewport:
         gl.check("the viewport")
         report = status.summarise(
             "viewport", renderer._plan, done, time.perf_counter() - start, renderer.timers.collect(),
-            [*request.scene.notes, *renderer.frame.facts.rig.notes], dict(renderer.gpu.uploads),
+            [*request.scene.notes, *renderer.frame.facts.rig.notes],
         )  # fmt: skip
         self._next = (request.key, request.scale, done)
-        return Picture(request, done, np.ascontiguousarray(pixels, np.float32), first_seconds, report)
+        return Picture(request, done, np.ascontiguousarray(pixels, np.float32), first_seconds, report,
+                       frozenset(renderer.gpu.uploads))  # fmt: skip
 
     def _close_renderer(self, gl) -> None:
         renderer, self._renderer = self._renderer, None
@@ -272,9 +275,11 @@ class Viewport:
         begun = old is None or old.request.key != picture.request.key or old.request.scale != picture.request.scale
         self.counts["subframes"] += picture.subframes - (0 if begun else old.subframes)
         self._picture = picture
-        if begun and picture.first > 0.0:
-            self._first = picture.first
-            self._adapt(picture)
+        if begun:
+            if picture.first > 0.0:
+                self._first = picture.first
+                self._adapt(picture)
+            self.counts.update(f"sent {kind}" for kind in picture.sent)
         status.publish(picture.report)
 
     def _adapt(self, picture: Picture) -> None:
