@@ -17,7 +17,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from . import __version__
-from .cli_measure import stability_command
+from .cli_measure import bench_command, stability_command
 from .gl import GLError
 from .outputs import OUTPUTS
 from .renderer import RenderError, inspect, render
@@ -325,6 +325,7 @@ def _notes(notes) -> None:
         console.print(f"note: {note}", style="yellow", highlight=False)
 
 
+main.add_command(bench_command)
 main.add_command(stability_command)
 
 

@@ -57,3 +57,51 @@ def stability_command(techniques, tests, full, strict, output) -> None:
     bad = [f"{t} {k}" for t, fs in results.items() for k, f in fs.items() if f.verdict in (stability.FAIL, stability.ERROR)]
     if strict and bad:
         raise click.ClickException(f"{len(bad)} failed: {', '.join(bad)}")
+
+
+@click.command("bench")
+@click.argument("scene", type=click.Path(path_type=Path), required=False)
+@click.option("--techniques", help="Techniques separated by commas; all by default.")
+@click.option("--scale", type=click.FloatRange(0.01, 4.0), help="Share of the paper's picture size; 1 on a GPU, 0.1 on a software driver.")
+@click.option("--frames", type=click.IntRange(1), help="Frames of each kind per row; 50 on a GPU, 5 on a software driver.")
+@click.option("--rows", help="Only rows whose name holds this text, e.g. '512²' or '1280x720'.")
+@click.option("--limit", type=float, default=60.0, show_default=True, help="Skip a row whose first frame takes longer, s.")
+@click.option("-o", "--output", type=click.Path(path_type=Path), default=Path("quartet-bench"), show_default=True,
+              help="Folder for bench.html, bench.json and bench.csv.")
+def bench_command(scene, techniques, scale, frames, rows, limit, output) -> None:
+    """The paper's Table 2 on this machine: frame rates of SCENE (Sponza, as there; a Cornell box if none is given)."""
+    from .compare import bench, scenes
+    from .compare.paper import TABLE_2
+    from .gl import shared
+    from .scene import Scene
+
+    names = technique_names(techniques)
+    chosen = [r for r in TABLE_2 if r.technique in names and (not rows or rows.lower() in r.key.lower())]
+    if not chosen:
+        raise click.UsageError(f"no row of the table matches {rows!r} for {', '.join(names)}")
+    if scene is None:
+        plain, label = scenes.cornell(light="sun"), "Cornell box"
+    elif scene.suffix.lower() == ".npz":
+        plain, label = Scene.load(scene), scene.name
+    else:
+        from .cli import _blender, _sync
+
+        with _blender(scene, None, None, (1280, 720), None, ()) as bscene:
+            (plain, _), label = _sync(bscene), scene.name
+    scale = scale or (0.1 if shared().call(lambda gl: gl.software) else 1.0)
+    calibration, timings = bench.bench(
+        plain, techniques=names, scale=scale, frames=frames, rows=chosen, limit_s=limit,
+        progress=lambda text: console.print(text, style="dim", highlight=False),
+    )  # fmt: skip
+    table = Table("technique", "setting", "paper", "paper fps", "here", "ms moving", "ms still", "fps", "× paper", "per hardware", "MiB")
+    for r in bench.records(calibration, timings):
+        paper_fps = "–" if r["paper_fps"] is None else f"{r['paper_fps']:g}{'?' if r['paper_doubtful'] else ''}"
+        numbers = [r["problem"], *[""] * 5] if r["problem"] else [
+            f"{r['ms']:.2f} ± {r['mad']:.2f}", f"{r['still_ms']:.2f}", f"{r['fps']:.1f}",
+            f"{r['ratio']:.3g}" if r["ratio"] else "–", f"{r['ratio_per_hardware']:.3g}" if r["ratio"] else "–", f"{r['planned_mib']:.1f}",
+        ]  # fmt: skip
+        table.add_row(r["technique"], r["setting"], r["paper_resolution"], paper_fps, r["resolution"], *numbers)
+    Console().print(table)
+    console.print(bench.hardware_text(calibration), highlight=False)
+    for path in bench.write(output, label, scale, calibration, timings):
+        console.print(f"wrote {path}")

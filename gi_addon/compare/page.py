@@ -84,7 +84,7 @@ def dump(value: Any) -> str:
 def table(head: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
     """An HTML table; cells are text, or ready HTML where they start with ``<``."""
     def cell(value: Any) -> str:
-        text = number(value) if isinstance(value, float) else str(value)
+        text = number(value) if value is None or isinstance(value, float) else str(value)
         inner = text if text.startswith("<") else esc(text)
         return inner if text.startswith("<td") else f"<td>{inner}</td>"
 
