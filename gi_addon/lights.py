@@ -151,6 +151,7 @@ class LightRig:
     shadow: Maps
     bounce: Maps
     notes: list[str] = field(default_factory=list)
+    direct_world: WorldMap | None = None  # the same world, its directions drawn as suits direct light
 
     def moves(self, index: int, *, bounce: bool) -> bool:
         """Whether source ``index`` is another point in each sub-frame. Suns, spheres and discs bounce from their
@@ -175,7 +176,7 @@ class LightRig:
                 u = np.array([0.5, 0.5])
             else:
                 u = sobol_2d(subframe, source.seed)
-            self._place(lights[i], source, u, subframes)
+            self._place(lights[i], source, u, subframes, bounce=bounce)
             lights[i]["first_view"] = maps.first[i]
             if maps.first[i] < 0:
                 lights[i]["views"] = 0
@@ -219,13 +220,14 @@ class LightRig:
 
     # -- sources -------------------------------------------------------------------------------------------------
 
-    def _place(self, out: np.ndarray, source: Source, u: np.ndarray, subframes: int) -> None:
+    def _place(self, out: np.ndarray, source: Source, u: np.ndarray, subframes: int, *, bounce: bool) -> None:
         out["kind"] = source.kind
         out["views"] = source.views
         out["flags"] = LIGHT_FLAG_BOUNCE
         light = source.light
         if source.kind == LIGHT_WORLD:
-            direction, weight, pdf = self.world.sample(u[None])
+            world = self.world if bounce or self.direct_world is None else self.direct_world
+            direction, weight, pdf = world.sample(u[None])
             out["axis_ws"] = -direction[0]
             out["emission"] = weight[0] / source.count
             out["patch_radius"] = np.sqrt(1.0 / (np.pi * max(pdf[0], 1e-12) * source.count * subframes))

@@ -103,6 +103,10 @@ class WorldSettings:
         512, "Resolution", "Texels along one side of those shadow maps", low=64, high=4096, unit="px",
         higher="finer openings", lower="faster, leaks through small walls",
     )  # fmt: skip
+    aimed: bool = _setting(
+        True, "Aim at Openings", "Draw the directions of direct light mostly from the parts of the sky that visible "
+        "surfaces see, from four sub-frames on",
+    )  # fmt: skip
 
 
 @dataclass

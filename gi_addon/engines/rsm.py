@@ -20,6 +20,7 @@ from ..passes.lights import LightList, RSMGeneration, ShadowMaps
 from ..passes.occupancy import CELL_UNIFORMS, Occupancy, set_cells
 from ..passes.resolve import Resolve
 from ..passes.volumetric import MEDIUM_UNIFORMS, Volumetric, medium_defines, set_medium
+from ..passes.world_guide import WorldGuide
 from ..settings import Settings
 
 
@@ -27,12 +28,13 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
     """Figure 4a, in order."""
     return [
         BRDFTables(),
+        Occupancy(),
+        WorldGuide(),
         LightList(),
         ShadowMaps(),
         RSMGeneration(),
         RSMFlux(),
         RSMSamplingPattern(),
-        Occupancy(),
         GBuffer(),
         TranslucentTint(),
         GBufferMips(),
