@@ -15,7 +15,7 @@ from ..graph import Buffer, Optional, Pass, Planned, Texture, Uniform
 from ..passes.ao import AOBlur, AOGeneration
 from ..passes.brdf_tables import BRDFTables
 from ..passes.direct_lighting import DirectLighting
-from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentTint, _screen, gather_size
+from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint, _screen, gather_size
 from ..passes.lights import LightList, RSMGeneration, ShadowMaps
 from ..passes.occupancy import CELL_UNIFORMS, Occupancy, set_cells
 from ..passes.resolve import Resolve
@@ -34,6 +34,8 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         RSMSamplingPattern(),
         Occupancy(),
         GBuffer(),
+        TranslucentLayer(),
+        TranslucentBack(),
         TranslucentTint(),
         GBufferMips(),
         AOGeneration(),
@@ -42,6 +44,7 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         IndirectLighting(settings),
         DirectLighting(),
         GlossyReflections(),
+        Refraction(),
         Volumetric(),
         Resolve(layers),
     ]
@@ -217,7 +220,7 @@ class IndirectLighting(Pass):
 
 _RAY_READS = (
     "occupancy", "rsm.depth", "rsm.normal", "rsm.albedo", "rsm.lights", "rsm.views", "gbuffer.depth", "gbuffer.normal",
-    Optional("vpls"), Optional("gbuffer.diffuse"), Optional("direct.diffuse"), Optional("indirect.diffuse"),
+    Optional("vpls"), Optional("gbuffer.emission", ("transmission.indirect",)), Optional("gbuffer.diffuse"), Optional("direct.diffuse"), Optional("indirect.diffuse"),
 )  # fmt: skip
 _RAY_UNIFORMS = (
     *CELL_UNIFORMS,
@@ -250,6 +253,31 @@ class GlossyReflections(Pass):
 
     def absent(self, facts: Facts) -> str | None:
         return None if facts.settings.use_glossy else "glossy reflections are switched off"
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        program = frame.program(planned)
+        _set_ray(frame, program, planned.facts)
+        frame.screen(planned, program)
+
+
+class Refraction(Pass):
+    """What is seen through refracting surfaces: a refracted ray per pixel, cast in the RSMs, which hold no such surface."""
+
+    title = "RSM Translucency"
+    figure = "Ray Casting in RSM"
+    reads = (
+        *_RAY_READS, "gbuffer.transmission", "translucent.depth", "translucent.normal",
+        "translucent.color", "translucent.medium", "translucent.back_depth", "translucent.back_normal",
+    )  # fmt: skip
+    writes = (
+        Texture("transmission.indirect", "transmission_indirect", "radiance through refracting surfaces, tinted; alpha 1 "
+                "where the ray found something", "rgba32f", _screen),
+    )  # fmt: skip
+    uniforms = _RAY_UNIFORMS
+    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/rsm/refraction_frag.glsl"}}
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return _gather_defines(facts, always=True)
 
     def run(self, frame: Frame, planned: Planned) -> None:
         program = frame.program(planned)

@@ -3,6 +3,9 @@
 // each light's map, and where it passes from before the map's surface to behind it, that surface is what it sees. A ray
 // that finds nothing adds nothing. Included where the RSM's textures, `occupancy`, `rsm_light_count` and cells are declared.
 
+#ifndef RAY_SEES_EMISSION
+#define RAY_SEES_EMISSION 0 // a mirror's view of emitters is direct light, which has its own pass
+#endif
 #include "engines/rsm/rsm_lib.glsl"
 #include "lib/occupancy_lib.glsl"
 #if HAS_VPLS
@@ -60,7 +63,11 @@ bool screen_radiance(vec3 position_ws, vec3 direction, out vec3 radiance)
     }
     vec3 diffuse = texelFetch(gbuf_diffuse, pixel, 0).rgb;
     // A metal's picture hangs on who looks.
-    if (max3(diffuse) <= 0.0) {
+    vec3 emission = vec3(0.0);
+#if RAY_SEES_EMISSION && HAS_GBUF_EMISSION
+    emission = texelFetch(gbuf_emission, pixel, 0).rgb;
+#endif
+    if (max3(diffuse + emission) <= 0.0) {
         return false;
     }
 #if HAS_DIRECT_DIFFUSE
@@ -69,7 +76,7 @@ bool screen_radiance(vec3 position_ws, vec3 direction, out vec3 radiance)
 #if HAS_INDIRECT_DIFFUSE
     radiance += texelFetch(indirect_diffuse, pixel, 0).rgb;
 #endif
-    radiance *= diffuse;
+    radiance = radiance * diffuse + emission;
     return true;
 }
 #endif
