@@ -2,6 +2,6 @@
 """Shader graphs to GLSL: a material is one generated function that every pass drawing surfaces includes."""
 
 from .compiler import CompiledGraph, compile_surface, compile_world
-from .means import Medium, mean_emission, mean_medium
+from .means import Medium, mean_albedo, mean_emission, mean_medium
 
-__all__ = ["CompiledGraph", "Medium", "compile_surface", "compile_world", "mean_emission", "mean_medium"]
+__all__ = ["CompiledGraph", "Medium", "compile_surface", "compile_world", "mean_albedo", "mean_emission", "mean_medium"]

@@ -56,7 +56,7 @@ Gathered gather_some_vpls(vec3 position_ws, vec3 n, vec3 ng, int first, int stri
             continue;
         }
 #if HAS_OCCUPANCY && MESH_LIGHTS
-        if (own_lamp_blocks(rsm_lights[vpl.light], vpl.position_ws, position_ws)) {
+        if (vpl.light >= 0 && own_lamp_blocks(rsm_lights[vpl.light], vpl.position_ws, position_ws)) {
             continue;
         }
 #endif
