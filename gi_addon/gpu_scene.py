@@ -462,7 +462,7 @@ def _morton(points: np.ndarray, bounds: np.ndarray) -> np.ndarray:
 
 def material_source(compiled: CompiledGraph, units: int) -> str:
     """``generated/material.glsl`` of a surface: its images, parameters, attributes and function."""
-    lines = ["#define SURFACE_IMPLICIT_LOD 1", *_param_lines(compiled)]
+    lines = ["#define WORLD_SUN_DISC 1", "#define SURFACE_IMPLICIT_LOD 1", *_param_lines(compiled)]
     lines += _image_lines(compiled, units)
     for slot in range(len(compiled.attributes)):
         if slot < _MAX_ATTRIBUTES:
@@ -475,9 +475,10 @@ def material_source(compiled: CompiledGraph, units: int) -> str:
     return "\n".join(lines)
 
 
-def world_source(compiled: CompiledGraph, units: int) -> str:
-    """``generated/world.glsl``: ``vec3 world_radiance(vec3 direction_ws)``."""
-    lines = ["#define SURFACE_IMPLICIT_LOD 0", *_param_lines(compiled)]  # worlds are evaluated in compute shaders
+def world_source(compiled: CompiledGraph, units: int, *, sun_disc: bool = True) -> str:
+    """``generated/world.glsl``: ``vec3 world_radiance(vec3 direction_ws)``; without ``sun_disc`` it leaves out suns that
+    are lights of their own."""
+    lines = [f"#define WORLD_SUN_DISC {int(sun_disc)}", "#define SURFACE_IMPLICIT_LOD 0", *_param_lines(compiled)]  # worlds are evaluated in compute shaders
     lines += _image_lines(compiled, units)
     lines += ['#include "lib/surface_lib.glsl"', '#include "nodes/math.glsl"', '#include "nodes/color.glsl"',
               '#include "nodes/texture.glsl"', *_includes(compiled), compiled.glsl]  # fmt: skip

@@ -31,7 +31,7 @@ from ..scene import (
     World,
 )
 from .compat import uses_nodes
-from .materials import ImageTable, default_material, read_material, read_world
+from .materials import ImageTable, default_material, read_material, read_world, world_sun
 
 _MESH_LIKE = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
 _RAYS = (("visible_camera", CAMERA), ("visible_diffuse", DIFFUSE), ("visible_glossy", GLOSSY),
@@ -47,7 +47,7 @@ class SceneSync:
         self._materials: dict[int, Material] = {}
         self._material_images: dict[int, list[tuple[int, Image]]] = {}
         self._images: dict[int, tuple[tuple, Image]] = {}
-        self._world: tuple[int, World] | None = None
+        self._world: tuple[tuple, World] | None = None
         self._default = default_material()
         self.counts: dict[str, int] = {}
 
@@ -127,14 +127,24 @@ class SceneSync:
                        visibility, _random(instance, obj), obj.pass_index, tuple(obj.color))  # fmt: skip
         self._meshes = {k: v for k, v in self._meshes.items() if k in used_keys}
         scene.instances = placed.instances()
-        if self._world is None:
-            self._world = (0, read_world(source.world, images))
-            self._material_images[0] = images.images[:]
-        world = self._world[1]
-        scene.world = world
+        world = scene.world = self._read_world(source.world, images)
+        sun = world_sun(world.graph)
+        if sun is not None and (sun.emission > 0.0).any():
+            scene.lights.append(sun)
         scene.images = images.images
         scene.camera = camera or _read_camera(source, depsgraph, resolution, scene.notes)
         return scene
+
+    def _read_world(self, source: bpy.types.World | None, images: ImageTable) -> World:
+        """The world; the last one where nothing of it has changed, its images' places in the table included."""
+        fresh = read_world(source, images)
+        used = [(i, images.images[i]) for n in fresh.graph.nodes if (i := n.params.get("image")) is not None]
+        old = self._world
+        now = (fresh.graph, fresh.ao_distance, fresh.visible_camera, used)
+        if old is not None and old[0] == now:
+            return old[1]
+        self._world = (now, fresh)
+        return fresh
 
     # -- meshes --------------------------------------------------------------------------------------------------
 

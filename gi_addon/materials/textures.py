@@ -9,6 +9,7 @@ import math
 from ..scene import Node
 from .compiler import COLOR, FLOAT, VECTOR, Compiler, Value
 from .nodes import _coordinate, _normal, node
+from .sky import sun_angles
 from .spectrum import blackbody_table, wavelength_table
 
 _DIMENSIONS = {"1D": 1, "2D": 2, "3D": 3, "4D": 4}
@@ -171,6 +172,27 @@ def brick(c: Compiler, n: Node) -> dict[str, Value]:
     mortar = c.input(n, "Mortar", COLOR, (0.0,) * 3)
     color = c.variable(COLOR, f"mix(mix({a.text}, {b.text}, {v}.x), {mortar.text}, {v}.y)")
     return {"Color": color, "Fac": Value(FLOAT, f"{v}.y")}
+
+
+@node("TEX_SKY")
+def sky_texture(c: Compiler, n: Node) -> dict[str, Value]:
+    """An atmosphere by its image ``image`` (:mod:`.sky`) and the sun's disc. With ``sun_light`` the sun shines as a light
+    of its own, and maps of the world for light leave it out."""
+    index = n.params.get("image")
+    if index is None:
+        c.approximate(n, f"the {n.params.get('sky_type', 'given')} sky model is a constant")
+        return {"Color": c.constant((0.3, 0.3, 0.3), COLOR)}
+    c.include("nodes/sky.glsl")
+    sampler = c.image(index, "Linear", "REPEAT")
+    elevation, rotation = sun_angles(n.params)
+    size = float(n.params.get("sun_size", 0.00951)) if n.params.get("sun_disc", False) else -1.0
+    intensity = float(n.params.get("sun_intensity", 1.0))
+    ends = [c.constant(tuple(v * intensity for v in n.params.get(k, (0.0,) * 3)), COLOR).text for k in ("sun_low", "sun_high")]
+    numbers = ", ".join(c.constant(v, FLOAT).text for v in (elevation, rotation, size))
+    shown = "WORLD_SUN_DISC" if n.params.get("sun_light") and c.world else "1"
+    co = _coordinate(c, n, "point.position_ws" if c.world else "point.generated")
+    text = f"node_sky({sampler}, {co}, {numbers}, {ends[0]}, {ends[1]}, {shown})"
+    return {"Color": c.variable(COLOR, text)}
 
 
 # --- light and colour -------------------------------------------------------------------------------------------------
