@@ -530,9 +530,9 @@ def test_a_sky_shines_as_in_cycles(blender, gl, disc):
         scene.camera = bpy.data.objects.new("C", camera)
         scene.camera.rotation_euler = (math.radians(95), 0, -0.4)
         scene.collection.objects.link(scene.camera)
-        scene.render.resolution_x, scene.render.resolution_y = 64, 40
+        scene.render.resolution_x, scene.render.resolution_y = 48, 30
         scene.render.engine = "QUARTET"
-        scene.quartet.samples = 16
+        scene.quartet.samples = 8
         names = ["Environment", "Diffuse Direct"]
         test = render_passes(scene, names)
         set_up(scene, Reference(0, 48, 1))
@@ -541,4 +541,6 @@ def test_a_sky_shines_as_in_cycles(blender, gl, disc):
         for name in names:
             s = score(test[name], reference[name])
             pictures_to("sky", f"{model}-{disc}-{name}", test=test[name], reference=reference[name])
-            assert abs(s.gain - 1.0) < 0.02 and s.rel_mse < 0.005, f"{model} {name}: {s.text()}"
+            # A sub-frame lights by a few directions of the sky: eight of them have that noise.
+            gain, error = (0.04, 0.02) if name == "Diffuse Direct" else (0.01, 0.003)
+            assert abs(s.gain - 1.0) < gain and s.rel_mse < error, f"{model} {name}: {s.text()}"
