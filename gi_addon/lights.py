@@ -223,6 +223,7 @@ class LightRig:
         out["kind"] = source.kind
         out["views"] = source.views
         out["flags"] = LIGHT_FLAG_BOUNCE
+        out["diffuse"] = out["glossy"] = 1.0
         light = source.light
         if source.kind == LIGHT_WORLD:
             direction, weight, pdf = self.world.sample(u[None])
@@ -235,6 +236,7 @@ class LightRig:
         if source.kind == LIGHT_MESH:
             self._place_on_mesh(out, source, u, subframes)
             return
+        out["diffuse"], out["glossy"] = light.visible_diffuse, light.visible_glossy
         matrix = light.matrix
         center = matrix[:3, 3]
         x, y, z = (_unit(matrix[:3, k]) for k in range(3))
@@ -438,16 +440,19 @@ def build_rig(
         corners, size = atlas.pack(sizes, power_of_two=True)
         return Maps(sizes, corners, size, first)
 
+    def bounced(source: Source) -> bool:
+        return source.light is None or source.light.visible_diffuse
+
     def own_shadow_map(source: Source) -> bool:
         if not shadows or (source.light is not None and not source.light.use_shadow):
             return False
         # What is drawn anew in each sub-frame anyway, at the very point that direct light comes from, is drawn once if
         # it is fine enough.
-        return not (bounces and source.kind in (LIGHT_AREA, LIGHT_MESH) and bounce_resolution >= shadow_resolution)
+        return not (bounces and bounced(source) and source.kind in (LIGHT_AREA, LIGHT_MESH) and bounce_resolution >= shadow_resolution)
 
     return LightRig(
         sources, bounds, world, emitters,
-        tiles(shadow_resolution, own_shadow_map, bounce=False), tiles(bounce_resolution, lambda s: bounces, bounce=True),
+        tiles(shadow_resolution, own_shadow_map, bounce=False), tiles(bounce_resolution, lambda s: bounces and bounced(s), bounce=True),
         notes,
     )  # fmt: skip
 

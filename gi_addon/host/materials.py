@@ -386,6 +386,19 @@ def default_material() -> Material:
     return Material("No Material", ShaderGraph((Node("BSDF_DIFFUSE", "", {"Color": (0.8, 0.8, 0.8)}),), Link(0, "BSDF")))
 
 
+def holdout_material(material: Material) -> Material:
+    """The material as an object has it that is held out: a hole to the camera, itself to light."""
+    nodes = [*material.graph.nodes]
+    n = len(nodes)
+    nodes += [
+        Node("LIGHT_PATH"), Node("HOLDOUT"),
+        Node("MIX_SHADER", "", {"Fac": Link(n, "Is Camera Ray"), "Shader": material.graph.surface, "Shader_001": Link(n + 1, "Holdout")}),
+    ]  # fmt: skip
+    if material.graph.surface is None:
+        del nodes[-1].inputs["Shader"]
+    return Material(f"{material.name} held out", ShaderGraph(tuple(nodes), Link(n + 2, "Shader"), material.graph.volume))
+
+
 def read_world(world: bpy.types.World | None, images: ImageTable) -> World:
     """A World from Blender's; black where the scene has none."""
     if world is None:

@@ -32,7 +32,7 @@ from ..scene import (
     World,
 )
 from .compat import uses_nodes
-from .materials import ImageTable, default_material, read_material, read_world, world_sun
+from .materials import ImageTable, default_material, holdout_material, read_material, read_world, world_sun
 
 _MESH_LIKE = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
 _RAYS = (("visible_camera", CAMERA), ("visible_diffuse", DIFFUSE), ("visible_glossy", GLOSSY),
@@ -50,6 +50,7 @@ class SceneSync:
         self._images: dict[int, tuple[tuple, Image]] = {}
         self._world: tuple[World, list[Image]] | None = None
         self._default = default_material()
+        self._holdouts: dict[int, tuple[Material, Material]] = {}
         self.counts: dict[str, int] = {}
 
     def forget(self) -> None:
@@ -127,8 +128,9 @@ class SceneSync:
             if index is None:
                 continue
             slots = [slot.material for slot in obj.material_slots] or list(getattr(obj.data, "materials", []))
-            visibility = _visibility(obj)
-            placed.add(index, matrix, tuple(materials.index(m) for m in slots) or (materials.index(None),),
+            visibility = _visibility(obj, depsgraph.view_layer)
+            held = bool(visibility & HOLDOUT)
+            placed.add(index, matrix, tuple(materials.index(m, held) for m in slots) or (materials.index(None, held),),
                        visibility, _random(instance, obj), obj.pass_index, tuple(obj.color))  # fmt: skip
         self._meshes = {k: v for k, v in self._meshes.items() if k in used_keys}
         scene.instances = placed.instances()
@@ -193,14 +195,21 @@ class _MaterialIndex:
 
     def __init__(self, sync: SceneSync, images: ImageTable, scene: Scene) -> None:
         self.sync, self.images, self.scene = sync, images, scene
-        self._index: dict[int, int] = {}
+        self._index: dict[tuple[int, bool], int] = {}
 
-    def index(self, material: bpy.types.Material | None) -> int:
+    def index(self, material: bpy.types.Material | None, held: bool = False) -> int:
+        """Index of a material; ``held``: of its variant that the camera sees as a hole."""
         key = material.original.session_uid if material is not None else 0
-        if key not in self._index:
-            self._index[key] = len(self.scene.materials)
-            self.scene.materials.append(self._get(material, key))
-        return self._index[key]
+        if (key, held) not in self._index:
+            found = self._get(material, key)
+            if held:
+                old = self.sync._holdouts.get(key)
+                if old is None or old[0] is not found:
+                    old = self.sync._holdouts[key] = (found, holdout_material(found))
+                found = old[1]
+            self._index[key, held] = len(self.scene.materials)
+            self.scene.materials.append(found)
+        return self._index[key, held]
 
     def _get(self, material, key: int) -> Material:
         if material is None:
@@ -247,6 +256,25 @@ def _shown_in(instance, space: bpy.types.SpaceView3D) -> bool:
     return bool(obj.original.visible_in_viewport_get(space))
 
 
+def share_meshes(scene: Scene, before: Scene | None) -> None:
+    """Take over the meshes of ``before`` that look the same in ``scene``, which then are not sent to the GPU again."""
+    if before is None:
+        return
+    old = {mesh.name: mesh for mesh in before.meshes}
+    for i, mesh in enumerate(scene.meshes):
+        same = old.get(mesh.name)
+        if same is not None and _same_mesh(mesh, same):
+            scene.meshes[i] = same
+
+
+def _same_mesh(a: Mesh, b: Mesh) -> bool:
+    arrays = [(a.positions, b.positions), (a.triangles, b.triangles), (a.slots, b.slots), (a.normals, b.normals)]
+    if a.attributes.keys() != b.attributes.keys():
+        return False
+    arrays += [(a.attributes[k], b.attributes[k]) for k in a.attributes]
+    return all(x.shape == y.shape and np.array_equal(x, y) for x, y in arrays)
+
+
 def _note(scene: Scene, text: str) -> None:
     if text not in scene.notes:
         scene.notes.append(text)
@@ -276,9 +304,13 @@ def _lookup3(x: int, y: int) -> int:
     return v[2]
 
 
-def _visibility(obj: bpy.types.Object) -> int:
+def _visibility(obj: bpy.types.Object, layer: bpy.types.ViewLayer) -> int:
+    """Bits of the rays that see an object, by itself and by its collections in the view layer."""
     bits = sum(bit for name, bit in _RAYS if getattr(obj, name, True))
-    if obj.is_holdout:
+    original = obj.original
+    if original.indirect_only_get(view_layer=layer):
+        bits &= ~CAMERA
+    if obj.is_holdout or original.holdout_get(view_layer=layer):
         bits |= HOLDOUT
     return bits & (ALL_RAYS | HOLDOUT)
 
@@ -452,7 +484,8 @@ def _read_light(instance, obj: bpy.types.Object, notes: list[str]) -> Light | No
     light = Light(
         obj.name, data.type, color * strength, matrix,
         use_shadow=bool(getattr(data, "use_shadow", True)) and bool(getattr(data.cycles, "cast_shadow", True)),
-        visible_camera=bool(obj.visible_camera),
+        visible_camera=bool(obj.visible_camera), visible_diffuse=bool(obj.visible_diffuse),
+        visible_glossy=bool(obj.visible_glossy),
     )  # fmt: skip
     if data.type in ("POINT", "SPOT"):
         light.radius = float(data.shadow_soft_size)
@@ -513,4 +546,25 @@ def _read_camera(
     if data.type == "PANO":
         notes.append(f"camera {obj.name} is panoramic, which a rasteriser has no projection for; it renders as its "
                      "perspective lens")  # fmt: skip
-    return Camera(matrix, np.array(projection, "f8"), float(data.clip_start), float(data.clip_end), name=obj.name)
+    result = Camera(matrix, np.array(projection, "f8"), float(data.clip_start), float(data.clip_end), name=obj.name)
+    if data.dof.use_dof:
+        _read_lens(result, obj, matrix)
+    return result
+
+
+def _read_lens(camera: Camera, obj: bpy.types.Object, matrix: np.ndarray) -> None:
+    """Depth of field as Cycles has it: the lens is focal length / f-number wide; for orthographic cameras a metre is that
+    length. A focus object counts by its depth along the view."""
+    data, dof = obj.data, obj.data.dof
+    length = 1.0 if data.type == "ORTHO" else 1e-3 * data.lens
+    camera.aperture = 0.5 * length / max(dof.aperture_fstop, 1e-5)
+    camera.focus = float(dof.focus_distance)
+    if dof.focus_object is not None:
+        target = dof.focus_object.matrix_world
+        if dof.focus_subtarget and dof.focus_object.pose and dof.focus_subtarget in dof.focus_object.pose.bones:
+            target = target @ dof.focus_object.pose.bones[dof.focus_subtarget].matrix
+        camera.focus = abs(float((np.array(target.translation) - matrix[:3, 3]) @ matrix[:3, 2]))
+    camera.focus = max(camera.focus, 1e-5)
+    camera.blades = int(dof.aperture_blades)
+    camera.blade_turn = float(dof.aperture_rotation)
+    camera.blade_ratio = max(float(dof.aperture_ratio), 1e-5)

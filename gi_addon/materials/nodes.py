@@ -48,7 +48,7 @@ def fallback(c: Compiler, n: Node) -> dict[str, Value]:
     c.approximate(n, f"node type {n.kind} is not evaluated")
     if n.kind in ("BSDF_TOON", "BSDF_HAIR", "BSDF_HAIR_PRINCIPLED", "BSDF_SHEEN", "BSDF_RAY_PORTAL"):
         return _outputs(diffuse(c, n))
-    if n.kind in ("HOLDOUT", "VOLUME_ABSORPTION", "VOLUME_SCATTER", "PRINCIPLED_VOLUME", "VOLUME_COEFFICIENTS"):
+    if n.kind in ("VOLUME_ABSORPTION", "VOLUME_SCATTER", "PRINCIPLED_VOLUME", "VOLUME_COEFFICIENTS"):
         return {name: Value(CLOSURE, "closure_none()") for name in ("BSDF", "Holdout", "Volume", "Shader")}
     colors = [v for k, v in n.inputs.items() if k.startswith("Color") and isinstance(v, tuple)]
     mean = tuple(sum(v[i] for v in colors) / len(colors) for i in range(3)) if colors else (0.5, 0.5, 0.5)
@@ -209,6 +209,12 @@ def transparent(c: Compiler, n: Node) -> dict[str, Value]:
     c.result.transparent = True
     color = c.input(n, "Color", COLOR, (1.0, 1.0, 1.0))
     return {"BSDF": c.variable(CLOSURE, f"closure_transparent({color.text})")}
+
+
+@node("HOLDOUT")
+def holdout(c: Compiler, n: Node) -> dict[str, Value]:
+    """A hole in the picture; to light it is black."""
+    return {"Holdout": Value(CLOSURE, "closure_holdout()")}
 
 
 @node("BSDF_TRANSLUCENT")

@@ -29,7 +29,7 @@ class Resolve(Pass):
         )
 
     def defines(self, facts: Facts) -> dict[str, int]:
-        return {f"LAYER_{name.upper()}": facts.layers.index(name) if name in facts.layers else -1 for name in LAYERS}
+        return {"WORLD_VISIBLE": int(facts.world_visible)} | {f"LAYER_{name.upper()}": facts.layers.index(name) if name in facts.layers else -1 for name in LAYERS}
 
     def run(self, frame: Frame, planned: Planned) -> None:
         units = len(planned.texture_reads())
