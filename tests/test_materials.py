@@ -221,3 +221,45 @@ def test_colour_attributes_of_any_domain_and_name(blender, gl):
 
     obj.material_slots[0].material = material_of(bpy, connect)
     agree("colour attributes", scene, ("Diffuse Color",), rel_mse=0.002, gain=0.005)
+
+
+def test_hair_curves_and_points_cover_what_cycles_rounds_cover(blender, gl):
+    """Particle hair with children, hair curves with a radius, a point cloud: the share of the picture they take, and their
+    shade. Three-sided strands and twenty-sided points are not round, so pixels differ; means do not."""
+    bpy = blender
+    scene = plane(bpy, size=(96, 54), samples=32)
+    red, green, blue = (diffuse(bpy, f"H{k}", c) for k, c in enumerate(((0.9, 0.1, 0.1), (0.1, 0.9, 0.1), (0.1, 0.1, 0.9))))
+    obj = cube(bpy, scene, (-2.0, 0.0, 0.2), 0.5, red)
+    obj.modifiers.new("hair", "PARTICLE_SYSTEM")
+    settings = obj.particle_systems[0].settings
+    settings.type, settings.count, settings.hair_length = "HAIR", 60, 0.8
+    settings.child_type, settings.rendered_child_count, settings.radius_scale = "SIMPLE", 3, 0.05
+    curves = bpy.data.hair_curves.new("C")
+    rng = np.random.default_rng(1)
+    sizes = [4, 6, 5] * 12
+    curves.add_curves(sizes)
+    points = np.concatenate([
+        np.cumsum(np.vstack([rng.uniform((-0.6, -0.6, 0.0), (0.6, 0.6, 0.0)), rng.uniform((-0.1, -0.1, 0.1), (0.1, 0.1, 0.4),
+                  (n - 1, 3))]), axis=0) for n in sizes
+    ])  # fmt: skip
+    curves.attributes["position"].data.foreach_set("vector", points.astype("f4").ravel())
+    curves.attributes.new("radius", "FLOAT", "POINT").data.foreach_set("value", np.full(len(points), 0.03, "f4"))
+    curves.materials.append(green)
+    scene.collection.objects.link(bpy.data.objects.new("C", curves))
+    cloud = bpy.data.pointclouds.new("P")
+    if hasattr(cloud, "resize"):
+        cloud.resize(30)
+        at = rng.uniform((1.4, -0.7, 0.2), (2.6, 0.7, 1.2), (30, 3)).astype("f4")
+        cloud.attributes["position"].data.foreach_set("vector", at.ravel())
+        cloud.attributes.new("radius", "FLOAT", "POINT").data.foreach_set("value", np.full(30, 0.12, "f4"))
+        cloud.materials.append(blue)
+        scene.collection.objects.link(bpy.data.objects.new("P", cloud))
+    names = ("Diffuse Color", "Diffuse Direct")
+    test, reference = quartet(scene, *names), cycles(scene, *names, samples=48)
+    pictures_to("materials", "hair", test=test["Diffuse Color"], reference=reference["Diffuse Color"])
+    ground = reference["Diffuse Color"][2, 48]
+    for k in range(3 if hasattr(cloud, "resize") else 2):
+        shown, expected = (np.clip(p["Diffuse Color"][..., k] - p["Diffuse Color"][..., (k + 1) % 3], 0.0, None).sum()
+                           for p in (test, reference))  # fmt: skip
+        assert expected > 3.0 and shown / expected == pytest.approx(1.0, abs=0.06), f"colour {k}, ground {ground}"
+    assert score(test["Diffuse Direct"], reference["Diffuse Direct"]).gain == pytest.approx(1.0, abs=0.03)

@@ -31,10 +31,11 @@ from ..scene import (
     Scene,
     World,
 )
+from . import strands
 from .compat import uses_nodes
 from .materials import ImageTable, default_material, holdout_material, read_material, read_world, world_sun
 
-_MESH_LIKE = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
+_MESH_LIKE = {"MESH", "CURVE", "SURFACE", "FONT", "META", "CURVES"}
 _RAYS = (("visible_camera", CAMERA), ("visible_diffuse", DIFFUSE), ("visible_glossy", GLOSSY),
          ("visible_transmission", TRANSMISSION), ("visible_volume_scatter", VOLUME),
          ("visible_shadow", SHADOW))  # fmt: skip
@@ -50,6 +51,8 @@ class SceneSync:
         self._images: dict[int, tuple[tuple, Image]] = {}
         self._world: tuple[World, list[Image]] | None = None
         self._default = default_material()
+        self._ball: Mesh | None = None
+        self._hairs: dict[tuple, list[tuple[Mesh, int]]] = {}
         self._holdouts: dict[int, tuple[Material, Material]] = {}
         self.counts: dict[str, int] = {}
 
@@ -68,6 +71,7 @@ class SceneSync:
                 if update.is_updated_geometry:
                     uid = data.original.session_uid
                     self._meshes = {k: v for k, v in self._meshes.items() if k[0] != uid}
+                    self._hairs = {k: v for k, v in self._hairs.items() if k[0] != uid}
             elif isinstance(data, (bpy.types.Mesh, bpy.types.Curve, bpy.types.MetaBall)):
                 changed = True
                 if update.is_updated_geometry:
@@ -94,6 +98,7 @@ class SceneSync:
         3D view with a local view or collections of its own: only what it shows counts."""
         if not keep:
             self._meshes.clear()
+            self._hairs.clear()
             self._materials.clear()
             self._world = None
         self.counts = {"meshes": 0, "materials": 0}
@@ -117,9 +122,13 @@ class SceneSync:
                     scene.lights.append(light)
                 continue
             if obj.type not in _MESH_LIKE:
-                if obj.type in ("CURVES", "POINTCLOUD", "VOLUME", "GREASEPENCIL"):
+                if obj.type == "POINTCLOUD":
+                    self._points(instance, obj, scene, materials, placed, depsgraph.view_layer)
+                elif obj.type in ("VOLUME", "GREASEPENCIL"):
                     _note(scene, f"{obj.type.capitalize()} objects are not rendered yet ({obj.name})")
                 continue
+            if obj.particle_systems and not instance.is_instance:
+                self._hair(obj, scene, materials, placed, depsgraph)
             matrix = np.array(instance.matrix_world, dtype="f8")
             if not np.isfinite(matrix).all():
                 _note(scene, f"object {obj.name} is left out: its transform is not a number")
@@ -154,6 +163,43 @@ class SceneSync:
                 return old
         self._world = (world, used)
         return world
+
+    def _points(self, instance, obj, scene: Scene, materials, placed, layer) -> None:
+        """A point cloud: one ball, placed at every point."""
+        at, radii = strands.points_of(obj)
+        if not len(at):
+            return
+        if self._ball is None:
+            self._ball = strands.ball()
+        if self._ball not in scene.meshes:
+            scene.meshes.append(self._ball)
+        index = scene.meshes.index(self._ball)
+        slots = [slot.material for slot in obj.material_slots] or [None]
+        used, visibility = tuple(materials.index(m) for m in slots), _visibility(obj, layer)
+        world = np.array(instance.matrix_world, "f8")
+        for place, radius in zip(at, radii, strict=True):
+            matrix = np.eye(4)
+            matrix[:3, :3] *= radius
+            matrix[:3, 3] = place
+            placed.add(index, world @ matrix, used, visibility, _random(instance, obj), obj.pass_index, tuple(obj.color))
+
+    def _hair(self, obj, scene: Scene, materials, placed, depsgraph) -> None:
+        """The hair of an object's particle systems, each a mesh of its own in world space."""
+        key = (obj.original.session_uid, "", "HAIR")
+        found = self._hairs.get(key)
+        if found is None:
+            try:
+                found = strands.particle_meshes(obj, depsgraph.mode == "RENDER")
+            except RuntimeError as error:
+                _note(scene, f"the hair of {obj.name} is left out: {error}")
+                return
+            self._hairs[key] = found
+        for mesh, slot in found:
+            scene.meshes.append(mesh)
+            slots = [s.material for s in obj.material_slots] or [None]
+            material = materials.index(slots[min(slot, len(slots) - 1)])
+            placed.add(len(scene.meshes) - 1, np.eye(4), (material,), _visibility(obj, depsgraph.view_layer), 0.0,
+                       obj.pass_index, tuple(obj.color))  # fmt: skip
 
     # -- meshes --------------------------------------------------------------------------------------------------
 
@@ -320,6 +366,8 @@ def _read_object_mesh(obj: bpy.types.Object, scene: Scene) -> Mesh | None:
     # In edit mode the evaluated mesh is still the editor's, without arrays: to_mesh() makes them.
     if obj.type == "MESH" and obj.mode != "EDIT":
         return read_mesh(obj.data, obj.name)
+    if obj.type == "CURVES":
+        return strands.curves_mesh(obj)
     try:
         mesh = obj.to_mesh()
     except RuntimeError as error:

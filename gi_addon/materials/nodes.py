@@ -32,6 +32,8 @@ INEXACT = {
     ("NEW_GEOMETRY", "Pointiness"): "Pointiness is ½",
     ("NEW_GEOMETRY", "Random Per Island"): "Random Per Island is ½",
     ("NEW_GEOMETRY", "Parametric"): "Parametric is 0",
+    ("HAIR_INFO", "Length"): "Length is 0",
+    ("HAIR_INFO", "Thickness"): "Thickness is 0",
     ("LIGHT_PATH", "Ray Length"): "Ray Length is 0",
 }
 # Best constants of nodes that are not evaluated, by output.

@@ -276,6 +276,17 @@ def tangent(c: Compiler, n: Node) -> dict[str, Value]:
     return {"Tangent": c.variable(VECTOR, f"node_tangent_radial({axis}, point)")}
 
 
+@node("HAIR_INFO")
+def hair_info(c: Compiler, n: Node) -> dict[str, Value]:
+    """Strands carry (1, place along them, random)."""
+    v = c.attribute("attr:.hair")
+    zero = Value(FLOAT, "0.0")
+    return {
+        "Is Strand": Value(FLOAT, f"{v}.x"), "Intercept": Value(FLOAT, f"{v}.y"), "Random": Value(FLOAT, f"{v}.z"),
+        "Length": zero, "Thickness": zero, "Tangent Normal": Value(VECTOR, "point.normal_ws"),
+    }  # fmt: skip
+
+
 @node("SQUEEZE")
 def squeeze(c: Compiler, n: Node) -> dict[str, Value]:
     v, width, center = (c.input(n, name, FLOAT, d).text for name, d in (("Value", 0.0), ("Width", 1.0), ("Center", 0.0)))
