@@ -441,18 +441,19 @@ def build_rig(
         return Maps(sizes, corners, size, first)
 
     def bounced(source: Source) -> bool:
-        return source.light is None or source.light.visible_diffuse
+        return bounces and (source.light is None or source.light.visible_diffuse)
 
     def own_shadow_map(source: Source) -> bool:
         if not shadows or (source.light is not None and not source.light.use_shadow):
             return False
         # What is drawn anew in each sub-frame anyway, at the very point that direct light comes from, is drawn once if
         # it is fine enough.
-        return not (bounces and bounced(source) and source.kind in (LIGHT_AREA, LIGHT_MESH) and bounce_resolution >= shadow_resolution)
+        drawn_anew = source.kind in (LIGHT_AREA, LIGHT_MESH) and bounced(source)
+        return not (drawn_anew and bounce_resolution >= shadow_resolution)
 
     return LightRig(
         sources, bounds, world, emitters,
-        tiles(shadow_resolution, own_shadow_map, bounce=False), tiles(bounce_resolution, lambda s: bounces and bounced(s), bounce=True),
+        tiles(shadow_resolution, own_shadow_map, bounce=False), tiles(bounce_resolution, bounced, bounce=True),
         notes,
     )  # fmt: skip
 

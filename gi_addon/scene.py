@@ -150,7 +150,8 @@ class Light:
     """A Blender light with Cycles' units.
 
     ``emission`` (3,): power Φ in W for POINT, SPOT and AREA, irradiance in W/m² for SUN, after colour, temperature and
-    exposure; ``visible_…``: which surfaces' lobes and whether the camera see it. ``matrix`` (4, 4): world from light; light shines along -Z. ``radius``: soft size in m (POINT, SPOT);
+    exposure. ``visible_…``: whether the camera and which lobes of surfaces see it. ``matrix`` (4, 4): world from light; light
+    shines along -Z. ``radius``: soft size in m (POINT, SPOT);
     ``angle``: full angular diameter (SUN), rad; ``spot_size`` full cone angle, rad; ``size`` (2,): width and height in
     object units; ``spread``: rad.
     """

@@ -381,6 +381,14 @@ def read_material(material: bpy.types.Material, images: ImageTable) -> Material:
     return Material(material.name, graph, pass_index=material.pass_index)
 
 
+def read_light(data: bpy.types.Light, images: ImageTable) -> ShaderGraph:
+    """The graph of a light's nodes."""
+    graph = ShaderGraph()
+    for tree in _trees(data):
+        graph = GraphReader(images, f"light {data.name}").read(tree, "OUTPUT_LIGHT")
+    return graph
+
+
 def default_material() -> Material:
     """What Blender shows where a surface has no material: grey, diffuse."""
     return Material("No Material", ShaderGraph((Node("BSDF_DIFFUSE", "", {"Color": (0.8, 0.8, 0.8)}),), Link(0, "BSDF")))
@@ -392,7 +400,9 @@ def holdout_material(material: Material) -> Material:
     n = len(nodes)
     nodes += [
         Node("LIGHT_PATH"), Node("HOLDOUT"),
-        Node("MIX_SHADER", "", {"Fac": Link(n, "Is Camera Ray"), "Shader": material.graph.surface, "Shader_001": Link(n + 1, "Holdout")}),
+        Node("MIX_SHADER", "", {
+            "Fac": Link(n, "Is Camera Ray"), "Shader": material.graph.surface, "Shader_001": Link(n + 1, "Holdout"),
+        }),
     ]  # fmt: skip
     if material.graph.surface is None:
         del nodes[-1].inputs["Shader"]
@@ -424,7 +434,8 @@ def _sky_background(graph: ShaderGraph) -> tuple[Node, int, float] | None:
     if background.kind != "BACKGROUND" or not isinstance(color, Link) or isinstance(strength, Link):
         return None
     node = graph.nodes[color.node]
-    if node.kind != "TEX_SKY" or not node.params.get("sun_disc") or "sun_high" not in node.params:
+    scattered = node.params.get("sky_type") not in ("PREETHAM", "HOSEK_WILKIE")  # they have no disc
+    if node.kind != "TEX_SKY" or not scattered or not node.params.get("sun_disc") or "sun_high" not in node.params:
         return None
     return None if isinstance(node.inputs.get("Vector"), Link) else (node, color.node, float(strength))
 

@@ -13,6 +13,7 @@ from dataclasses import fields
 import bpy
 import numpy as np
 
+from ..materials import mean_emission
 from ..scene import (
     ALL_RAYS,
     CAMERA,
@@ -33,12 +34,16 @@ from ..scene import (
 )
 from . import strands
 from .compat import uses_nodes
-from .materials import ImageTable, default_material, holdout_material, read_material, read_world, world_sun
+from .materials import ImageTable, default_material, holdout_material, read_light, read_material, read_world, world_sun
 
 _MESH_LIKE = {"MESH", "CURVE", "SURFACE", "FONT", "META", "CURVES"}
 _RAYS = (("visible_camera", CAMERA), ("visible_diffuse", DIFFUSE), ("visible_glossy", GLOSSY),
          ("visible_transmission", TRANSMISSION), ("visible_volume_scatter", VOLUME),
          ("visible_shadow", SHADOW))  # fmt: skip
+
+
+# Nodes of lights whose mean is their value.
+_LIGHT_NUMBERS = {"EMISSION", "RGB", "VALUE", "BLACKBODY", "LIGHT_FALLOFF", "MATH", "ADD_SHADER", "MIX_SHADER", "MIX", "MIX_RGB"}
 
 
 class SceneSync:
@@ -117,7 +122,7 @@ class SceneSync:
             if space is not None and not _shown_in(instance, space):
                 continue
             if obj.type == "LIGHT":
-                light = _read_light(instance, obj, scene.notes)
+                light = _read_light(instance, obj, scene.notes, images)
                 if light is not None:
                     scene.lights.append(light)
                 continue
@@ -518,7 +523,7 @@ def _by_material(mesh, triangles: np.ndarray, triangle_count: int) -> tuple[np.n
 # --- lights and cameras -----------------------------------------------------------------------------------------------
 
 
-def _read_light(instance, obj: bpy.types.Object, notes: list[str]) -> Light | None:
+def _read_light(instance, obj: bpy.types.Object, notes: list[str], images: ImageTable) -> Light | None:
     """A Light from Blender's, in Cycles' units."""
     data = obj.data
     strength = float(data.energy) * 2.0 ** float(getattr(data, "exposure", 0.0))
@@ -526,7 +531,7 @@ def _read_light(instance, obj: bpy.types.Object, notes: list[str]) -> Light | No
     if getattr(data, "use_temperature", False):
         color = color * np.array(data.temperature_color, "f8")
     if uses_nodes(data):
-        color = color * _light_nodes(data, notes)
+        color = color * _light_nodes(data, notes, images)
     matrix = np.array(instance.matrix_world, "f8")
     scale = [float(np.linalg.norm(matrix[:3, k])) for k in range(3)]
     light = Light(
@@ -561,17 +566,13 @@ def _light_area(light: Light, scale: list[float]) -> float:
     return math.pi * light.radius**2 * 4.0 if light.radius > 0 else 1.0
 
 
-def _light_nodes(data: bpy.types.Light, notes: list[str]) -> np.ndarray:
-    """Colour × strength of an Emission node; anything else counts as 1 with a note."""
-    tree = data.node_tree
-    output = next((n for n in tree.nodes if n.type == "OUTPUT_LIGHT" and not n.mute), None)
-    if output is None or not output.inputs["Surface"].is_linked:
-        return np.zeros(3) if output is not None else np.ones(3)
-    node = output.inputs["Surface"].links[0].from_node
-    if node.type != "EMISSION" or node.inputs["Color"].is_linked or node.inputs["Strength"].is_linked:
-        notes.append(f"light {data.name}: its nodes are not evaluated, its colour and power alone count")
-        return np.ones(3)
-    return np.array(node.inputs["Color"].default_value[:3], "f8") * float(node.inputs["Strength"].default_value)
+def _light_nodes(data: bpy.types.Light, notes: list[str], images: ImageTable) -> np.ndarray:
+    """Colour × strength (3,) of a light's nodes, textures by their mean; a note where they are more than numbers."""
+    graph = read_light(data, images)
+    kinds = {node.kind for node in graph.nodes}
+    if kinds - _LIGHT_NUMBERS:
+        notes.append(f"light {data.name}: {', '.join(sorted(kinds - _LIGHT_NUMBERS))} count by their mean")
+    return mean_emission(graph, images.images)
 
 
 def _read_camera(

@@ -32,11 +32,14 @@ class Sky:
 
 
 def sky(params: Mapping[str, Any]) -> Sky | None:
-    """The sky of a TEX_SKY node's settings; None for a model that is not computed (Preetham's, Hosek's)."""
+    """The sky of a TEX_SKY node's settings; None for a model that is not known. Hosek's and Wilkie's is taken for
+    Preetham's, whose successor it is."""
     kind = params.get("sky_type", "MULTIPLE_SCATTERING")
     elevation, _ = sun_angles(params)
     dust = params.get("aerosol_density", params.get("dust_density", 1.0))
     densities = (params.get("air_density", 1.0), dust, params.get("ozone_density", 1.0))
+    if kind in ("PREETHAM", "HOSEK_WILKIE"):
+        return preetham(elevation, float(params.get("turbidity", 2.2)))
     size = max(float(params.get("sun_size", 0.00951)), 1e-6)
     altitude = float(params.get("altitude", 0.0))
     model = {"SINGLE_SCATTERING": _Single, "NISHITA": _Single, "MULTIPLE_SCATTERING": _Multiple}.get(kind)
@@ -47,6 +50,9 @@ def sky(params: Mapping[str, Any]) -> Sky | None:
 
 def sun_angles(params: Mapping[str, Any]) -> tuple[float, float]:
     """(elevation in ±90°, rotation) of the sun, rad: an elevation beyond the zenith is seen from the other side."""
+    if params.get("sky_type") in ("PREETHAM", "HOSEK_WILKIE"):
+        x, y, z = params.get("sun_direction", (0.0, 0.0, 1.0))
+        return float(np.arctan2(z, np.hypot(x, y))), float(np.arctan2(x, y)) % (2.0 * np.pi)
     elevation = (float(params.get("sun_elevation", 0.26)) + np.pi) % (2.0 * np.pi) - np.pi
     rotation = float(params.get("sun_rotation", 0.0))
     if abs(elevation) > 0.5 * np.pi:
@@ -275,6 +281,41 @@ class _Multiple:
     def sun(self, elevation: float, size: float) -> np.ndarray:
         through = self.to_sun(np.array([np.sin(elevation)]), np.array([self.altitude / self.thickness]))[0]
         return np.maximum(REC709_FROM_XYZ @ (self.irradiance * through / _disc(size) @ self.xyz), 0.0)
+
+
+# A. J. Preetham et al., "A Practical Analytic Model for Daylight", SIGGRAPH 1999: Perez' coefficients of Y, x and y, each
+# (slope over turbidity, value at none), and the zenith's chromaticities as polynomials of turbidity and the sun's angle.
+_PEREZ = {
+    "Y": ((0.1787, -1.4630), (-0.3554, 0.4275), (-0.0227, 5.3251), (0.1206, -2.5771), (-0.0670, 0.3703)),
+    "x": ((-0.0193, -0.2592), (-0.0665, 0.0008), (-0.0004, 0.2125), (-0.0641, -0.8989), (-0.0033, 0.0452)),
+    "y": ((-0.0167, -0.2608), (-0.0950, 0.0092), (-0.0079, 0.2102), (-0.0441, -1.6537), (-0.0109, 0.0529)),
+}
+_ZENITH = {
+    "x": ((0.00166, -0.00375, 0.00209, 0.0), (-0.02903, 0.06377, -0.03202, 0.00394), (0.11693, -0.21196, 0.06052, 0.25886)),
+    "y": ((0.00275, -0.00610, 0.00317, 0.0), (-0.04214, 0.08970, -0.04153, 0.00516), (0.15346, -0.26756, 0.06670, 0.26688)),
+}
+_PREETHAM_UNIT = 0.06  # Blender's radiance per kcd/m²
+
+
+def preetham(elevation: float, turbidity: float) -> Sky:
+    """Preetham's clear sky; below the horizon it goes on as at it."""
+    theta_sun = 0.5 * np.pi - elevation
+    rows, azimuths = _rays()
+    mu = np.clip(_directions(rows, azimuths) @ _directions(np.array([elevation]), np.array([np.pi]))[0, 0], -1.0, 1.0)
+    theta = np.minimum(0.5 * np.pi - rows, 0.5 * np.pi - 0.001)[:, None]
+
+    def perez(name: str, theta, cosine):
+        a, b, c, d, e = (slope * turbidity + base for slope, base in _PEREZ[name])
+        return (1.0 + a * np.exp(b / np.cos(theta))) * (1.0 + c * np.exp(d * np.arccos(cosine)) + e * cosine**2)
+
+    chi = (4.0 / 9.0 - turbidity / 120.0) * (np.pi - 2.0 * theta_sun)
+    zenith = {"Y": _PREETHAM_UNIT * ((4.0453 * turbidity - 4.9710) * np.tan(chi) - 0.2155 * turbidity + 2.4192)}
+    for name, rows_of in _ZENITH.items():
+        zenith[name] = sum(np.polyval(p, theta_sun) * turbidity ** (2 - k) for k, p in enumerate(rows_of))
+    values = {n: zenith[n] * perez(n, theta, mu) / perez(n, 0.0, np.cos(theta_sun)) for n in ("Y", "x", "y")}
+    ratio = values["Y"] / np.maximum(values["y"], 1e-6)
+    xyz = np.stack([values["x"] * ratio, values["Y"] + 0.0 * ratio, (1.0 - values["x"] - values["y"]) * ratio], -1)
+    return Sky(_image(xyz), np.zeros(3), np.zeros(3))
 
 
 def _disc(size: float) -> float:

@@ -39,6 +39,13 @@ def blackbody_table() -> list[tuple[float, ...]]:
     return [(*row, 1.0) for row in np.maximum(rgb, 0.0).tolist()]
 
 
+def blackbody(temperature: float) -> np.ndarray:
+    """The colour (3,) at one temperature, from the table."""
+    table = np.array(blackbody_table())[:, :3]
+    at = (1e4 / np.clip(temperature, 800.0, 12000.0) - 1e4 / 12000.0) / (1e4 / 800.0 - 1e4 / 12000.0) * (_ENTRIES - 1)
+    return np.stack([np.interp(at, np.arange(_ENTRIES), table[:, k]) for k in range(3)])
+
+
 @cache
 def wavelength_table() -> list[tuple[float, ...]]:
     """Colours (Rec.709) of single wavelengths, 380 to 780 nm by 5 nm, over 2.52: Blender's scale, after which no component

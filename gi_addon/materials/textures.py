@@ -182,6 +182,8 @@ def sky_texture(c: Compiler, n: Node) -> dict[str, Value]:
     if index is None:
         c.approximate(n, f"the {n.params.get('sky_type', 'given')} sky model is a constant")
         return {"Color": c.constant((0.3, 0.3, 0.3), COLOR)}
+    if n.params.get("sky_type") == "HOSEK_WILKIE":
+        c.approximate(n, "Hosek's and Wilkie's sky is taken for Preetham's")
     c.include("nodes/sky.glsl")
     sampler = c.image(index, "Linear", "REPEAT")
     elevation, rotation = sun_angles(n.params)
