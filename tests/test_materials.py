@@ -263,3 +263,43 @@ def test_hair_curves_and_points_cover_what_cycles_rounds_cover(blender, gl):
                            for p in (test, reference))  # fmt: skip
         assert expected > 3.0 and shown / expected == pytest.approx(1.0, abs=0.06), f"colour {k}, ground {ground}"
     assert score(test["Diffuse Direct"], reference["Diffuse Direct"]).gain == pytest.approx(1.0, abs=0.03)
+
+
+# --- closures ---------------------------------------------------------------------------------------------------------
+
+
+def test_sheen_and_coat_give_back_no_more_than_cycles(blender, gl):
+    """Balls of the Principled BSDF with sheen or a coat, and the Sheen shader: the colours, which are albedos, and what a sun
+    makes of them. Sheen is Lambert's here and the coat shares the base's lobe: the totals hold, the shapes less."""
+    bpy = blender
+    scene = plane(bpy, size=(120, 40), samples=16)
+
+    def principled(**inputs):
+        def connect(tree, out):
+            node = tree.nodes.new("ShaderNodeBsdfPrincipled")
+            for name, value in inputs.items():
+                socket = node.inputs[name.replace("_", " ")]
+                socket.default_value = (*value, 1.0) if isinstance(value, tuple) else value
+            tree.links.new(node.outputs[0], out.inputs[0])
+
+        return material_of(bpy, connect)
+
+    def cloth(tree, out):
+        node = tree.nodes.new("ShaderNodeBsdfSheen")
+        node.inputs["Color"].default_value = (0.9, 0.5, 0.3, 1.0)
+        node.inputs["Roughness"].default_value = 0.6
+        tree.links.new(node.outputs[0], out.inputs[0])
+
+    kinds = (
+        principled(Base_Color=(0.1, 0.2, 0.5), Sheen_Weight=1.0, Sheen_Roughness=0.5, Roughness=0.6),
+        principled(Base_Color=(0.5, 0.1, 0.1), Sheen_Weight=0.5, Sheen_Roughness=0.9, Sheen_Tint=(0.2, 1.0, 0.4)),
+        material_of(bpy, cloth),
+        principled(Base_Color=(0.6, 0.2, 0.1), Coat_Weight=1.0, Coat_Roughness=0.3, Roughness=0.5),
+    )
+    for k, material in enumerate(kinds):
+        bpy.ops.mesh.primitive_uv_sphere_add(radius=0.6, location=(-2.4 + 1.6 * k, 0.0, 0.6), segments=48, ring_count=24)
+        bpy.ops.object.shade_smooth()
+        bpy.context.object.data.materials.append(material)
+    # The two lobes of a coat as one are brighter along the rim, in a pixel's width of the balls.
+    agree("sheen", scene, ("Diffuse Color", "Glossy Color", "Diffuse Direct"), rel_mse=0.02, gain=0.03,
+          gain_of={"Glossy Color": 0.05}, rel_mse_of={"Glossy Color": 0.2})  # fmt: skip

@@ -21,7 +21,7 @@ _DATA = ("Non-Color", "Raw", "Generic Data", "Utility - Raw")
 # Settings of nodes that decide what they compute.
 _PARAMS: dict[str, tuple[str, ...]] = {
     "BSDF_PRINCIPLED": ("distribution", "subsurface_method"), "BSDF_GLOSSY": ("distribution",),
-    "BSDF_METALLIC": ("distribution", "fresnel_type"), "BSDF_GLASS": ("distribution",),
+    "BSDF_SHEEN": ("distribution",), "BSDF_METALLIC": ("distribution", "fresnel_type"), "BSDF_GLASS": ("distribution",),
     "MATH": ("operation", "use_clamp"), "VECT_MATH": ("operation",),
     "MIX": ("data_type", "blend_type", "factor_mode", "clamp_factor", "clamp_result"),
     "MIX_RGB": ("blend_type", "use_clamp"), "MAPPING": ("vector_type",), "SEPARATE_COLOR": ("mode",),

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from ..scene import Node
 from .compiler import CLOSURE, COLOR, FLOAT, VECTOR, Compiler, Value
 from .means import BINARY
+from .spectrum import sheen_table
 
 NODES: dict[str, Callable[[Compiler, Node], dict[str, Value]]] = {}
 
@@ -48,7 +49,7 @@ _FALLBACK = {
 def fallback(c: Compiler, n: Node) -> dict[str, Value]:
     """Any node without a function: its colour inputs' mean, or a constant that stands for it."""
     c.approximate(n, f"node type {n.kind} is not evaluated")
-    if n.kind in ("BSDF_TOON", "BSDF_HAIR", "BSDF_HAIR_PRINCIPLED", "BSDF_SHEEN", "BSDF_RAY_PORTAL"):
+    if n.kind in ("BSDF_TOON", "BSDF_HAIR", "BSDF_HAIR_PRINCIPLED", "BSDF_RAY_PORTAL"):
         return _outputs(diffuse(c, n))
     if n.kind in ("VOLUME_ABSORPTION", "VOLUME_SCATTER", "PRINCIPLED_VOLUME", "VOLUME_COEFFICIENTS"):
         return {name: Value(CLOSURE, "closure_none()") for name in ("BSDF", "Holdout", "Volume", "Shader")}
@@ -85,8 +86,8 @@ def _normal(c: Compiler, n: Node, name: str = "Normal") -> str:
 def principled(c: Compiler, n: Node) -> dict[str, Value]:
     """Blender's Principled BSDF: alpha over (metal | glass | (specular over diffuse and subsurface)), plus emission.
 
-    Sheen, anisotropy and thin film are left out and said so; the coat is a second dielectric layer folded into the one
-    glossy lobe.
+    Anisotropy and thin film are left out and said so. The coat is a second dielectric layer folded into the one glossy lobe;
+    sheen takes its share from all below and is scattered as diffuse light.
     """
     r = c.result
     base = c.input(n, "Base Color", COLOR, (0.8, 0.8, 0.8))
@@ -98,7 +99,7 @@ def principled(c: Compiler, n: Node) -> dict[str, Value]:
     alpha = c.input(n, "Alpha", FLOAT, 1.0)
     normal = _normal(c, n)
     multi = "1.0" if n.params.get("distribution", "MULTI_GGX") == "MULTI_GGX" else "0.0"
-    for name, what in (("Sheen Weight", "sheen"), ("Anisotropic", "anisotropy"), ("Thin Film Thickness", "thin film")):
+    for name, what in (("Anisotropic", "anisotropy"), ("Thin Film Thickness", "thin film")):
         if not c.input(n, name, FLOAT, 0.0).is_zero:
             c.approximate(n, f"{what} is left out")
     out = c.name()
@@ -132,10 +133,34 @@ def principled(c: Compiler, n: Node) -> dict[str, Value]:
             f"principled_coat({out}, {coat.text}, {c.input(n, 'Coat Roughness', FLOAT, 0.03).text}, "
             f"{c.input(n, 'Coat IOR', FLOAT, 1.5).text}, {c.input(n, 'Coat Tint', COLOR, (1.0, 1.0, 1.0)).text}, point);"
         )
+    sheen = c.input(n, "Sheen Weight", FLOAT, 0.0)
+    if not sheen.is_zero:
+        r.diffuse = True
+        first = _sheen(c, n, c.input(n, "Sheen Roughness", FLOAT, 0.5))
+        sheen_tint = c.input(n, "Sheen Tint", COLOR, (1.0, 1.0, 1.0))
+        c.statement(f"principled_sheen({out}, saturate({sheen.text}), {sheen_tint.text}, {first}, {normal}, point);")
     if not alpha.equals(1.0):
         r.transparent = True
         c.statement(f"{out} = closure_alpha({out}, {alpha.text});")
     return {"BSDF": Value(CLOSURE, out)}
+
+
+def _sheen(c: Compiler, n: Node, roughness: Value) -> int:
+    """The first parameter of sheen's albedo at the node's roughness; one that varies counts as ½."""
+    if roughness.constant is None:
+        c.approximate(n, "sheen's roughness counts as ½")
+    return c.table(sheen_table(roughness.constant[0] if roughness.constant else 0.5))[0]
+
+
+@node("BSDF_SHEEN")
+def sheen(c: Compiler, n: Node) -> dict[str, Value]:
+    """Fabric's shine, scattered as diffuse light."""
+    c.result.diffuse = True
+    if n.params.get("distribution", "MICROFIBER") != "MICROFIBER":
+        c.approximate(n, "Ashikhmin's sheen is taken for the microfibre one")
+    color = c.input(n, "Color", COLOR, (0.8,) * 3)
+    first, normal = _sheen(c, n, c.input(n, "Roughness", FLOAT, 0.5)), _normal(c, n)
+    return {"BSDF": c.variable(CLOSURE, f"closure_diffuse({color.text} * sheen_albedo({first}, {normal}, point), {normal})")}
 
 
 @node("BSDF_DIFFUSE")
