@@ -302,4 +302,4 @@ def test_sheen_and_coat_give_back_no_more_than_cycles(blender, gl):
         bpy.context.object.data.materials.append(material)
     # The two lobes of a coat as one are brighter along the rim, in a pixel's width of the balls.
     agree("sheen", scene, ("Diffuse Color", "Glossy Color", "Diffuse Direct"), rel_mse=0.02, gain=0.03,
-          gain_of={"Glossy Color": 0.05}, rel_mse_of={"Glossy Color": 0.2})  # fmt: skip
+          gain_of={"Glossy Color": 0.05}, rel_mse_of={"Glossy Color": 0.2, "Diffuse Direct": 0.06})  # fmt: skip
