@@ -96,6 +96,7 @@ def main() -> None:
     parser.add_argument("--resolution", default="320x180")
     parser.add_argument("--cycles-samples", type=int, default=64)
     parser.add_argument("--bounces", type=int, default=12, help="of Cycles; 1 is what one-bounce techniques approximate")
+    parser.add_argument("--compose", action="store_true", help="only put what is rendered already on a sheet")
     parser.add_argument("--only", default="", help="part of a scene's name")
     parser.add_argument("-o", "--output", type=Path, required=True)
     arguments = parser.parse_args()
@@ -105,10 +106,11 @@ def main() -> None:
         return
     paths = sorted(p for p in arguments.scenes.rglob("*") if p.suffix in SUFFIXES and arguments.only in name_of(p))
     rows = []
-    for path in paths:
+    for path in paths if not arguments.compose else ():
         command = [sys.executable, __file__, "--one", str(path), "--technique", arguments.technique,
                    "--samples", str(arguments.samples), "--resolution", arguments.resolution,
-                   "--cycles-samples", str(arguments.cycles_samples), "--bounces", str(arguments.bounces), "-o", str(arguments.output)]  # fmt: skip
+                   "--cycles-samples", str(arguments.cycles_samples), "--bounces", str(arguments.bounces),
+                   "-o", str(arguments.output)]  # fmt: skip
         for assignment in arguments.set:
             command += ["--set", assignment]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -117,6 +119,8 @@ def main() -> None:
         rows.append((path, done.returncode))
         if arguments.technique != "none" and done.returncode == 0:
             print(line(path, arguments), flush=True)
+    if arguments.compose:
+        rows = [(p, 0) for p in paths if (arguments.output / f"{name_of(p)}.{arguments.technique}.json").is_file()]
     if arguments.technique != "none":
         write_sheet([p for p, code in rows if code == 0], arguments)
 

@@ -115,6 +115,32 @@ def test_light_sees_only_the_lobes_it_may(blender, gl):
     agree("light visibility", scene, ("Diffuse Direct", "Glossy Direct"))
 
 
+def test_what_is_not_followed_is_said(blender, gl):
+    """Light linking, a panoramic camera, an unknown node: a note each, and a picture all the same."""
+    from gi_addon.host.sync import SceneSync
+    from gi_addon.materials import compile_surface
+
+    bpy = blender
+    scene = plane(bpy, samples=1)
+    lamp = next(o for o in scene.objects if o.type == "LIGHT")
+    lamp.light_linking.receiver_collection = bpy.data.collections.new("Some")
+    scene.camera.data.type = "PANO"
+
+    def gabor(tree, out):
+        node = tree.nodes.new("ShaderNodeTexGabor")
+        bsdf = tree.nodes.new("ShaderNodeBsdfDiffuse")
+        tree.links.new(node.outputs["Value"], bsdf.inputs["Color"])
+        tree.links.new(bsdf.outputs[0], out.inputs[0])
+
+    next(o for o in scene.objects if o.type == "MESH").material_slots[0].material = material_of(bpy, gabor)
+    plain = SceneSync().read(bpy.context.evaluated_depsgraph_get(), resolution=SIZE)
+    notes = " | ".join(plain.notes)
+    assert "linked" in notes and "panoramic" in notes
+    said = [text for m in plain.materials for text in compile_surface(m.graph, plain.images).approximated]
+    assert any("TEX_GABOR" in text for text in said)
+    assert quartet(scene, "Combined")["Combined"][..., :3].max() > 0.0
+
+
 # --- lenses and time --------------------------------------------------------------------------------------------------
 
 
@@ -303,3 +329,26 @@ def test_sheen_and_coat_give_back_no_more_than_cycles(blender, gl):
     # The two lobes of a coat as one are brighter along the rim, in a pixel's width of the balls.
     agree("sheen", scene, ("Diffuse Color", "Glossy Color", "Diffuse Direct"), rel_mse=0.02, gain=0.03,
           gain_of={"Glossy Color": 0.05}, rel_mse_of={"Glossy Color": 0.2, "Diffuse Direct": 0.06})  # fmt: skip
+
+
+def test_metals_by_index_and_by_colour_reflect_as_in_cycles(blender, gl):
+    """Gold by its index and extinction, and a metal by its colour: Glossy Color is the albedo of the lobe."""
+    bpy = blender
+    if not hasattr(bpy.types, "ShaderNodeBsdfMetallic"):
+        pytest.skip("this Blender has no Metallic BSDF")
+    scene = plane(bpy, size=(80, 40), samples=16)
+    for k, kind in enumerate(("PHYSICAL_CONDUCTOR", "F82")):
+
+        def connect(tree, out, kind=kind):
+            node = tree.nodes.new("ShaderNodeBsdfMetallic")
+            node.fresnel_type = kind
+            for name, value in (("IOR", (0.18, 0.42, 1.37)), ("Extinction", (3.42, 2.35, 1.77))):
+                if kind == "PHYSICAL_CONDUCTOR":
+                    next(s for s in node.inputs if s.identifier == name).default_value = value
+            node.inputs["Roughness"].default_value = 0.3
+            tree.links.new(node.outputs[0], out.inputs[0])
+
+        bpy.ops.mesh.primitive_uv_sphere_add(radius=0.8, location=(-1.0 + 2.0 * k, 0.0, 0.8), segments=48, ring_count=24)
+        bpy.ops.object.shade_smooth()
+        bpy.context.object.data.materials.append(material_of(bpy, connect))
+    agree("metal", scene, ("Glossy Color",), rel_mse=0.01, gain=0.02)

@@ -526,6 +526,9 @@ def _by_material(mesh, triangles: np.ndarray, triangle_count: int) -> tuple[np.n
 def _read_light(instance, obj: bpy.types.Object, notes: list[str], images: ImageTable) -> Light | None:
     """A Light from Blender's, in Cycles' units."""
     data = obj.data
+    linking = getattr(obj, "light_linking", None)
+    if linking is not None and (linking.receiver_collection or linking.blocker_collection):
+        notes.append(f"light {obj.name} is linked to some objects; here it lights and is blocked by all")
     strength = float(data.energy) * 2.0 ** float(getattr(data, "exposure", 0.0))
     color = np.array(data.color, "f8")
     if getattr(data, "use_temperature", False):

@@ -99,7 +99,8 @@ def principled(c: Compiler, n: Node) -> dict[str, Value]:
     alpha = c.input(n, "Alpha", FLOAT, 1.0)
     normal = _normal(c, n)
     multi = "1.0" if n.params.get("distribution", "MULTI_GGX") == "MULTI_GGX" else "0.0"
-    for name, what in (("Anisotropic", "anisotropy"), ("Thin Film Thickness", "thin film")):
+    for name, what in (("Anisotropic", "anisotropy"), ("Diffuse Roughness", "diffuse roughness"),
+                       ("Thin Film Thickness", "thin film")):  # fmt: skip
         if not c.input(n, name, FLOAT, 0.0).is_zero:
             c.approximate(n, f"{what} is left out")
     out = c.name()
@@ -175,10 +176,16 @@ def diffuse(c: Compiler, n: Node) -> dict[str, Value]:
 
 @node("BSDF_GLOSSY", "BSDF_ANISOTROPIC", "BSDF_METALLIC")
 def glossy(c: Compiler, n: Node) -> dict[str, Value]:
-    """GGX without Fresnel (Glossy), or with Schlick's towards white (Metallic)."""
+    """GGX without Fresnel (Glossy), or with Schlick's from F0 towards white (Metallic)."""
     c.result.glossy = True
     metallic = n.kind == "BSDF_METALLIC"
     color = c.input(n, "Base Color" if metallic else "Color", COLOR, (0.8, 0.8, 0.8))
+    if metallic and n.params.get("fresnel_type") == "PHYSICAL_CONDUCTOR":
+        index = c.input(n, "IOR", VECTOR, (2.757, 2.513, 2.231))
+        extinction = c.input(n, "Extinction", VECTOR, (3.867, 3.404, 3.009))
+        color = c.variable(COLOR, f"conductor_f0({index.text}, {extinction.text})")
+    elif metallic and not c.input(n, "Edge Tint", COLOR, (1.0, 1.0, 1.0)).equals(1.0):
+        c.approximate(n, "the edge tint is left out")
     roughness = c.input(n, "Roughness", FLOAT, 0.5)
     if not c.input(n, "Anisotropy", FLOAT, 0.0).is_zero:
         c.approximate(n, "anisotropy is left out")

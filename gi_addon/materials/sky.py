@@ -44,7 +44,10 @@ def sky(params: Mapping[str, Any]) -> Sky | None:
     if kind == "HOSEK_WILKIE":
         # Turbidity 1 is air alone, 2.2 a clear day: dust of density 1.
         found = _Multiple(0.0, 1.0, max(turbidity - 1.0, 0.0) / 1.2, 1.0).sky(elevation, 0.01)
-        return Sky((found.pixels * (*(_HOSEK_UNIT,) * 3, 1.0)).astype("f4"), np.zeros(3), np.zeros(3))
+        pixels = (found.pixels * (*(_HOSEK_UNIT,) * 3, 1.0)).astype("f4")
+        # It has no ground: below the horizon it goes on as at it.
+        pixels[: SIZE[1] // 2] = pixels[SIZE[1] // 2]
+        return Sky(pixels, np.zeros(3), np.zeros(3))
     size = max(float(params.get("sun_size", 0.00951)), 1e-6)
     altitude = float(params.get("altitude", 0.0))
     model = {"SINGLE_SCATTERING": _Single, "NISHITA": _Single, "MULTIPLE_SCATTERING": _Multiple}.get(kind)

@@ -131,6 +131,12 @@ void principled_sheen(inout Closure c, float weight, vec3 tint, int first, vec3 
     c.normal_ws = normal_ws;
 }
 
+// Reflectance at normal incidence of index n and extinction k.
+vec3 conductor_f0(vec3 n, vec3 k)
+{
+    return ((n - 1.0) * (n - 1.0) + k * k) / ((n + 1.0) * (n + 1.0) + k * k);
+}
+
 Closure closure_glass(vec3 color, float roughness, float ior, vec3 n, SurfacePoint point)
 {
     float eta = max(ior, 1e-5);
