@@ -224,6 +224,7 @@ class LightRig:
         out["kind"] = source.kind
         out["views"] = source.views
         out["flags"] = LIGHT_FLAG_BOUNCE
+        out["diffuse"] = out["glossy"] = 1.0
         light = source.light
         if source.kind == LIGHT_WORLD:
             world = self.world if bounce or self.direct_world is None else self.direct_world
@@ -237,6 +238,7 @@ class LightRig:
         if source.kind == LIGHT_MESH:
             self._place_on_mesh(out, source, u, subframes)
             return
+        out["diffuse"], out["glossy"] = light.visible_diffuse, light.visible_glossy
         matrix = light.matrix
         center = matrix[:3, 3]
         x, y, z = (_unit(matrix[:3, k]) for k in range(3))
@@ -440,16 +442,20 @@ def build_rig(
         corners, size = atlas.pack(sizes, power_of_two=True)
         return Maps(sizes, corners, size, first)
 
+    def bounced(source: Source) -> bool:
+        return bounces and (source.light is None or source.light.visible_diffuse)
+
     def own_shadow_map(source: Source) -> bool:
         if not shadows or (source.light is not None and not source.light.use_shadow):
             return False
         # What is drawn anew in each sub-frame anyway, at the very point that direct light comes from, is drawn once if
         # it is fine enough.
-        return not (bounces and source.kind in (LIGHT_AREA, LIGHT_MESH) and bounce_resolution >= shadow_resolution)
+        drawn_anew = source.kind in (LIGHT_AREA, LIGHT_MESH) and bounced(source)
+        return not (drawn_anew and bounce_resolution >= shadow_resolution)
 
     return LightRig(
         sources, bounds, world, emitters,
-        tiles(shadow_resolution, own_shadow_map, bounce=False), tiles(bounce_resolution, lambda s: bounces, bounce=True),
+        tiles(shadow_resolution, own_shadow_map, bounce=False), tiles(bounce_resolution, bounced, bounce=True),
         notes,
     )  # fmt: skip
 

@@ -170,6 +170,10 @@ class Settings:
         16, "Viewport Samples", "Sub-frames averaged in the viewport while nothing changes", low=1, high=65536,
         soft_high=256, higher="smoother after a while", lower="settles sooner",
     )  # fmt: skip
+    motion_steps: int = _setting(
+        8, "Motion Steps", "Times at which the scene is read while the shutter is open, with motion blur switched on; the "
+        "sub-frames are shared among them", low=1, high=256, higher="smoother streaks, longer sync", lower="faster; 1 is sharp",
+    )  # fmt: skip
     bounces: int = _setting(
         1, "Bounces", "Diffuse bounces of light; 1 is the paper's", low=0, high=8,
         higher="brighter interiors", lower="0 is direct light only",

@@ -73,11 +73,11 @@ void main()
             arriving *= medium_transmittance(position_ws, l, light_is_directional(light) ? 1e30 : length(light.position_ws - position_ws));
 #endif
             vec3 irradiance = arriving * cos_l;
-            open_light += irradiance;
-            lit_light += irradiance * visible;
+            open_light += irradiance * light.diffuse;
+            lit_light += irradiance * visible * light.diffuse;
 #if HAS_DIRECT_GLOSSY
             if (has_lobe && visible > 0.0) {
-                glossy += arriving * visible * gain * ggx_eval(lobe, widened_alpha(alpha, angle), n, v, l);
+                glossy += light.glossy * arriving * visible * gain * ggx_eval(lobe, widened_alpha(alpha, angle), n, v, l);
             }
 #endif
         }

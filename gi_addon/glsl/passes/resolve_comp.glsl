@@ -26,8 +26,10 @@ void main()
     }
     vec2 uv = (vec2(pixel) + 0.5) * view.inverse_resolution;
     float depth = 0.0;
+    bool held = false;
 #if HAS_GBUF_DEPTH
     depth = texelFetch(gbuf_depth, pixel, 0).r;
+    held = texelFetch(gbuf_depth, pixel, 0).g < 0.0;
 #endif
     bool surface = depth > 0.0;
 
@@ -62,7 +64,7 @@ void main()
 #if HAS_GBUF_EMISSION
         emission = texelFetch(gbuf_emission, pixel, 0).rgb;
 #endif
-    } else if (view.film_transparent < 0.5) {
+    } else if (view.film_transparent < 0.5 && WORLD_VISIBLE != 0) {
         environment = world_radiance(normalize(ray_direction_ws(uv)));
     }
 #if HAS_GBUF_TRANSMISSION
@@ -107,7 +109,7 @@ void main()
     environment *= passes;
 
 #if LAYER_COMBINED >= 0
-    float alpha = surface || view.film_transparent < 0.5 ? 1.0 : 0.0;
+    float alpha = !held && (surface || view.film_transparent < 0.5) ? 1.0 : 0.0;
     add(LAYER_COMBINED, pixel, vec4(diffuse_direct + diffuse_indirect + glossy_direct + glossy_indirect +
                                         through_direct + through_indirect + volume + emission + environment,
                                     alpha));
