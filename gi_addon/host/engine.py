@@ -20,12 +20,16 @@ from ..outputs import LONG_NAMES, OUTPUTS
 from ..renderer import Renderer, RenderError
 from ..scene import Scene
 from ..settings import SettingError, Settings
-from . import properties
+from . import properties, status
 from .compat import pass_name
 from .sync import SceneSync
 from .viewport import Viewport, close_all
 
 _POLL_SECONDS = 0.05
+# How long a cancelled render waits for its sub-frame to end, in seconds.
+_PATIENCE = 0.5
+# Sub-frames of a material's or a light's thumbnail: it is shown at 32 to 256 pixels.
+_PREVIEW_SAMPLES = 8
 # Told of every render's progress (0 … 1, text) and of its notes: the command line shows them.
 listeners: list = []
 
@@ -42,6 +46,8 @@ class Job:
     layer: str
     film_transparent: bool
     persistent: bool
+    preview: bool = False
+    timed: bool = False
 
 
 class QuartetEngine(bpy.types.RenderEngine):
@@ -91,9 +97,13 @@ class QuartetEngine(bpy.types.RenderEngine):
         plain = self._sync.read(depsgraph, resolution=resolution, keep=persistent)
         layer = depsgraph.view_layer
         wanted = ("Combined", *(o.name for o in OUTPUTS.values() if o.name != "Combined" and pass_enabled(layer, o)))
+        settings = properties.read(scene)
+        if self.is_preview:
+            settings.samples = _PREVIEW_SAMPLES
+        measure = not self.is_preview and any(wm.quartet.measure for wm in bpy.data.window_managers)
         return Job(
-            plain, properties.read(scene), wanted, resolution, region, layer.name, bool(render.film_transparent),
-            persistent,
+            plain, settings, wanted, resolution, region, layer.name, bool(render.film_transparent), persistent,
+            preview=self.is_preview, timed=measure,
         )  # fmt: skip
 
     def render(self, depsgraph) -> None:
@@ -115,6 +125,7 @@ class QuartetEngine(bpy.types.RenderEngine):
                 self._free()
 
     def _fail(self, message: str) -> None:
+        status.failed(message)
         self.error_set(f"Quartet: {message}")
         self.report({"ERROR"}, f"Quartet: {message}")
 
@@ -128,10 +139,15 @@ class QuartetEngine(bpy.types.RenderEngine):
         def work(gl):
             if self._renderer is None:
                 self._renderer = Renderer(gl)
-            return self._renderer.render(
+            renderer = self._renderer
+            result = renderer.render(
                 job.scene, job.settings, job.outputs, resolution=job.resolution, region=job.region,
-                film_transparent=job.film_transparent, progress=progress, cancel=cancel,
+                film_transparent=job.film_transparent, progress=progress, cancel=cancel, timed=job.timed,
             )  # fmt: skip
+            if not job.preview:
+                report = status.summarise("final", renderer, result.plan, job.scene, result.subframes, result.seconds)
+                status.publish(report)
+            return result
 
         self.update_stats("", "Quartet: preparing")
         future = shared().submit(work, cancel=cancel)
@@ -146,6 +162,10 @@ class QuartetEngine(bpy.types.RenderEngine):
                 break
             if self.test_break():
                 cancel.cancel()
+                # A sub-frame that takes long ends by itself on the GL thread; nobody has to watch it.
+                concurrent.futures.wait([future], timeout=_PATIENCE)
+                if not future.done():
+                    raise Cancelled
         result = future.result()
         for note in result.notes:
             self.report({"INFO"}, f"Quartet: {note}")
@@ -171,8 +191,8 @@ class QuartetEngine(bpy.types.RenderEngine):
         """Give GPU memory back."""
         renderer, self._renderer, self._sync = self._renderer, None, None
         if renderer is not None:
-            with contextlib.suppress(GLError):  # the context is gone, and the memory with it
-                shared().call(lambda gl: renderer.close())
+            # Not waited for: a cancelled sub-frame may still be in the making.
+            shared().submit(_close, renderer)
 
     # -- viewport ------------------------------------------------------------------------------------------------
 
@@ -202,6 +222,11 @@ class QuartetEngine(bpy.types.RenderEngine):
                 self.register_pass(
                     scene, renderlayer, pass_name(output), len(output.channels), output.channels, output.kind
                 )
+
+
+def _close(gl, renderer: Renderer) -> None:
+    with contextlib.suppress(GLError):  # the context is gone, and the memory with it
+        renderer.close()
 
 
 def pass_enabled(layer: bpy.types.ViewLayer, output) -> bool:

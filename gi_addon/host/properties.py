@@ -52,9 +52,35 @@ def _make(cls: type, name: str) -> type:
 _window_class: list[type] = []
 
 
+def _show(window, _context) -> None:
+    from . import comparison  # which reads settings through this module
+
+    comparison.show(window)
+
+
 def _make_window() -> type:
     """What this session of Blender shows; saved in no file and no part of the picture."""
+    from . import comparison
+
     annotations = {
+        "reference": bpy.props.EnumProperty(
+            name="Reference", default="Rinf",
+            items=[("R1", "One Bounce", "What the paper's techniques approximate"),
+                   ("Rinf", "All Bounces", "32 bounces: the truth")],
+        ),
+        "reference_samples": bpy.props.IntProperty(
+            name="Cycles Samples", default=64, min=1, max=65536, soft_max=1024,
+            description="Samples of each of two Cycles renders. Higher: less noise in the reference. Lower: sooner",
+        ),
+        "compare_percentage": bpy.props.IntProperty(
+            name="Size", default=50, min=1, max=100, subtype="PERCENTAGE",
+            description="Size of the compared pictures, as a share of the render size",
+        ),
+        "compare_pass": bpy.props.EnumProperty(
+            name="Pass", items=comparison.passes, update=_show, description="Pass of the comparison that is shown"
+        ),
+        "compare_view": bpy.props.EnumProperty(name="View", items=comparison.VIEWS, update=_show),
+        "cancel_compare": bpy.props.BoolProperty(name="Cancel", description="Give the comparison up"),
         "measure": bpy.props.BoolProperty(
             name="Measure Passes", default=False,
             description="Time every pass of the viewport. On software OpenGL this costs a little speed",
