@@ -14,6 +14,7 @@ from .gl import shared
 from .host import comparison, status
 from .host.comparison import QUARTET_OT_compare
 from .host.operators import QUARTET_MT_presets, QUARTET_OT_add_preset, QUARTET_OT_preset, QUARTET_OT_split_view
+from .outputs import OUTPUTS
 from .settings import TECHNIQUES, Settings, walk
 
 # What each technique is good at and what it gets wrong, one line each, for who has to choose.
@@ -53,7 +54,7 @@ class _Panel:
         return self.layout.column()
 
 
-def lines(text: str, width: int = 46) -> list[str]:
+def lines(text: str, width: int = 52) -> list[str]:
     """``text`` in lines for labels, which Blender does not wrap."""
     out: list[str] = []
     for word in text.split():
@@ -182,7 +183,7 @@ def _group_label(name: str) -> str:
     if name.upper() in _TECHNIQUES:
         return _TECHNIQUES[name.upper()]
     text = type(getattr(Settings(), name)).__doc__ or name
-    return text.split("(")[0].split(",")[0].strip(" .")
+    return text.split("(")[0].split(",")[0].strip(" .").title()
 
 
 def _group_panels() -> list[type]:
@@ -274,12 +275,76 @@ class QUARTET_PT_compare(_Panel, bpy.types.Panel):
         _say(box, "relMSE is the error beyond Cycles' own noise; gain is the ratio of all light")
 
 
+class QUARTET_PT_passes(_Panel, bpy.types.Panel):
+    """The passes that a render writes."""
+
+    bl_label = "Passes"
+    bl_context = "view_layer"
+
+    def draw(self, context):
+        column = self._column()
+        for output in OUTPUTS.values():
+            owner, _, flag = output.flag.rpartition(".")
+            target = getattr(context.view_layer, owner, None) if owner else context.view_layer
+            if output.name != "Combined" and hasattr(target, flag):
+                column.prop(target, flag, text=output.name)
+
+
+class QUARTET_PT_object_visibility(_Panel, bpy.types.Panel):
+    """Which rays see an object."""
+
+    bl_label = "Ray Visibility"
+    bl_context = "object"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and context.object is not None
+
+    def draw(self, context):
+        column = self._column()
+        for name in ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow"):
+            column.prop(context.object, f"visible_{name}", text=name.replace("_", " ").title())
+        column.prop(context.object, "is_holdout")
+
+
+class QUARTET_PT_light_shadow(_Panel, bpy.types.Panel):
+    """Whether a light casts shadows."""
+
+    bl_label = "Shadow"
+    bl_context = "data"
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and context.light is not None
+
+    def draw(self, context):
+        self._column().prop(context.light, "use_shadow", text="Cast Shadow")
+
+
+class QUARTET_PT_world_distance(_Panel, bpy.types.Panel):
+    """How far an occluder counts in the Ambient Occlusion pass."""
+
+    bl_label = "Ambient Occlusion"
+    bl_context = "world"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and context.scene.world is not None
+
+    def draw(self, context):
+        self._column().prop(context.scene.world.light_settings, "distance")
+
+
 _classes: list[type] = []
 
 
 def register() -> None:
     _classes[:] = [QUARTET_PT_presets, QUARTET_PT_technique, QUARTET_PT_sampling, QUARTET_PT_effects, *_group_panels(),
-                   QUARTET_PT_film, QUARTET_PT_performance, QUARTET_PT_materials, QUARTET_PT_compare]  # fmt: skip
+                   QUARTET_PT_film, QUARTET_PT_performance, QUARTET_PT_materials, QUARTET_PT_compare,
+                   QUARTET_PT_passes, QUARTET_PT_object_visibility, QUARTET_PT_light_shadow,
+                   QUARTET_PT_world_distance]  # fmt: skip
     for cls in _classes:
         bpy.utils.register_class(cls)
 

@@ -258,7 +258,10 @@ class QUARTET_OT_compare(bpy.types.Operator):
         if running.process.poll() is None:
             return {"PASS_THROUGH"}
         self._end(context)
-        return self._finish(context)
+        outcome = self._finish(context)
+        if outcome == {"FINISHED"}:
+            _image_editor(context)
+        return outcome
 
     def _start(self, context) -> bool:
         global running
@@ -281,8 +284,6 @@ class QUARTET_OT_compare(bpy.types.Operator):
         finally:
             stop()
         show(context.window_manager.quartet)
-        if not bpy.app.background:
-            _image_editor(context)
         combined = latest.scores.get("Combined")
         if combined is not None:
             self.report({"INFO"}, f"Combined: {combined.text()}")

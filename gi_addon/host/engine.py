@@ -247,25 +247,34 @@ def picture(render: bpy.types.RenderSettings) -> tuple[tuple[int, int], tuple[in
     return (width, height), (x0, y0, max(0, x1 - x0), max(0, y1 - y0))
 
 
-# Panels of Blender's own that make sense for this engine: those that any engine may use, and EEVEE's and Cycles'
-# common ones by their names.
+# Panels of Blender's own that any engine may use but that say nothing here …
 _NOT_OURS = {
     "VIEWLAYER_PT_filter", "VIEWLAYER_PT_layer_passes", "RENDER_PT_eevee", "RENDER_PT_simplify_greasepencil",
+    "DATA_PT_light", "NODE_DATA_PT_light",
+}  # fmt: skip
+# … and EEVEE's that hold what Quartet reads too. Their names have been the same since 4.5.
+_BORROWED = {
+    "DATA_PT_EEVEE_light", "NODE_DATA_PT_EEVEE_light", "DATA_PT_camera_dof", "DATA_PT_camera_dof_aperture",
+    "EEVEE_MATERIAL_PT_context_material", "EEVEE_MATERIAL_PT_surface", "EEVEE_MATERIAL_PT_volume", "MATERIAL_PT_preview",
+    "EEVEE_WORLD_PT_surface", "EEVEE_WORLD_PT_volume",
 }  # fmt: skip
 
 
-def _panels() -> list[type]:
+def standard_panels() -> list[type]:
+    """Blender's own panels that work for this engine."""
     out = []
     for panel in bpy.types.Panel.__subclasses__():
         engines = getattr(panel, "COMPAT_ENGINES", None)
-        if engines and "BLENDER_RENDER" in engines and panel.__name__ not in _NOT_OURS:
+        if engines and (
+            ("BLENDER_RENDER" in engines and panel.__name__ not in _NOT_OURS) or panel.__name__ in _BORROWED
+        ):
             out.append(panel)
     return out
 
 
 def register() -> None:
     bpy.utils.register_class(QuartetEngine)
-    for panel in _panels():
+    for panel in standard_panels():
         panel.COMPAT_ENGINES.add("QUARTET")
 
 
