@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import time
 import types
 
 import numpy as np
@@ -276,3 +277,23 @@ def test_a_multilayer_file_of_blender_is_read_alike(context, gl, monkeypatch):
     assert set(names) <= set(without)
     for name in names:
         assert np.array_equal(with_package[name], without[name]), name
+
+
+@pytest.mark.blender
+def test_thumbnails_show_the_material(context, gl, blender):
+    """Blender's preview scene rendered by Quartet: a red ball is red, in the middle, before something else."""
+    material = blender.data.materials.new("Red")
+    from gi_addon.host.compat import node_tree
+
+    node_tree(material).nodes["Principled BSDF"].inputs["Base Color"].default_value = (0.8, 0.02, 0.02, 1.0)
+    blender.context.scene.render.engine = "QUARTET"
+    material.asset_generate_preview()
+    preview = material.preview_ensure()
+    for _ in range(600):  # the preview job runs beside
+        if any(preview.image_pixels_float):
+            break
+        time.sleep(0.05)
+    width, height = preview.image_size
+    pixels = np.array(preview.image_pixels_float).reshape(height, width, 4)
+    red, green, _, alpha = pixels[height // 2, width // 2]
+    assert alpha > 0.9 and red > 0.1 and red > 1.5 * green

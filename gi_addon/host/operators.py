@@ -85,8 +85,9 @@ def beside(context, area) -> bpy.types.Window:
     twin = bpy.data.scenes.get(name) or bpy.data.scenes.new(name)
     _link_alike(scene, twin)
     before = set(context.window_manager.windows)
+    # A main window: child windows have their parent's scene.
     with context.temp_override(window=context.window, area=area):
-        bpy.ops.wm.window_new()
+        bpy.ops.wm.window_new_main()
     window = next(w for w in context.window_manager.windows if w not in before)
     window.scene = twin
     other = max(window.screen.areas, key=lambda a: a.width * a.height)

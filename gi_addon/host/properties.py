@@ -12,12 +12,21 @@ from ..settings import Meta, Settings, meta_of, walk
 _classes: list[type] = []
 
 
+def _redraw(_settings, _context) -> None:
+    """Have the viewports drawn again: Blender does not know that they depend on these."""
+    for window_manager in bpy.data.window_managers:
+        for window in window_manager.windows:
+            for area in window.screen.areas:
+                if area.type == "VIEW_3D":
+                    area.tag_redraw()
+
+
 def _property(default, meta: Meta):
-    text = meta.text
+    common = {"name": meta.label, "description": meta.text, "default": default, "update": _redraw}
     if meta.choices:
-        return bpy.props.EnumProperty(name=meta.label, description=text, items=list(meta.choices), default=default)
+        return bpy.props.EnumProperty(items=list(meta.choices), **common)
     if isinstance(default, bool):
-        return bpy.props.BoolProperty(name=meta.label, description=text, default=default)
+        return bpy.props.BoolProperty(**common)
     limits = {}
     if meta.low is not None:
         limits["min"] = meta.low
@@ -27,9 +36,9 @@ def _property(default, meta: Meta):
         limits["soft_max"] = meta.soft_high
     if isinstance(default, int):
         whole = {k: int(v) for k, v in limits.items()}
-        return bpy.props.IntProperty(name=meta.label, description=text, default=default, **whole)
+        return bpy.props.IntProperty(**common, **whole)
     kind = {"m": {"subtype": "DISTANCE", "unit": "LENGTH"}}.get(meta.unit, {})
-    return bpy.props.FloatProperty(name=meta.label, description=text, default=default, **limits, **kind)
+    return bpy.props.FloatProperty(**common, **limits, **kind)
 
 
 def _make(cls: type, name: str) -> type:
