@@ -396,4 +396,13 @@ def transformed(scene: Scene, matrix: np.ndarray) -> Scene:
     return scene
 
 
+# Scenes by name, for ``quartet compare builtin:NAME``.
+BUILTIN = {
+    "cornell": cornell, "cornell-empty": lambda: cornell(blocks=False), "cornell-area": lambda: cornell(light="area"),
+    "cornell-point": lambda: cornell(light="point"), "corridor": corridor, "corner": corner, "furnace": furnace,
+    "integrating-sphere": integrating_sphere, "sliding-plate": sliding_plate, "thin-wall": lambda: thin_wall(0.1),
+    "two-patches": two_patches,
+}  # fmt: skip
+
+
 __all__ = [name for name in globals() if not name.startswith("_") and name not in ("annotations", "CAMERA", "np")]

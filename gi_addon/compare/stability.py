@@ -247,12 +247,15 @@ def as_json(results: dict[str, dict[str, Finding]], *, full: bool) -> dict:
     for technique, findings in results.items():
         body["techniques"][technique] = {
             key: {
-                "verdict": f.verdict, "nature": f.nature, "note": f.note, "seconds": round(f.seconds, 2),
+                "verdict": f.verdict,
+                "nature": f.nature,
+                "note": f.note,
+                "seconds": round(f.seconds, 2),
                 "quantities": [{**asdict(q), "limit": q.limit, "holds": q.holds} for q in f.quantities],
                 "curves": [asdict(c) for c in f.curves],
             }
             for key, f in findings.items()
-        }  # fmt: skip
+        }
     return body
 
 
