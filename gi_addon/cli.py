@@ -17,7 +17,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from . import __version__
-from .cli_measure import bench_command, report_command, stability_command
+from .cli_measure import bench_command, certify_command, report_command, stability_command
 from .gl import GLError
 from .outputs import OUTPUTS
 from .renderer import RenderError, inspect, render
@@ -152,9 +152,19 @@ def snapshot_command(scene, frame, resolution, output) -> None:
 @_scene_options
 @click.option("--passes", default="Combined", help="'all', or pass names separated by commas.")
 @click.option("--dot", is_flag=True, help="Print the graph as Graphviz dot instead.")
-def inspect_command(scene, technique, samples, resolution, frame, assignments, passes, dot) -> None:
+@click.option("--certify", is_flag=True, help="Measure against Cycles: error, dearer settings, ablation, predicted failures.")
+@click.option("--reference-samples", default=256, show_default=True, help="Cycles samples per half, for --certify.")
+def inspect_command(
+    scene, technique, samples, resolution, frame, assignments, passes, dot, certify, reference_samples
+) -> None:
     """Print which passes SCENE needs and which are left out, why, and their sizes."""
     names = _pass_names(passes)
+    if certify:
+        if scene.suffix.lower() == ".npz":
+            raise click.UsageError("a snapshot has no Cycles reference: give the scene file itself")
+        with _blender(scene, technique, samples, resolution or (128, 72), frame, assignments) as bscene:
+            certify_command(scene, bscene, reference_samples)
+        return
     if scene.suffix.lower() == ".npz":
         plain, resolution = Scene.load(scene), resolution or (960, 540)
         settings = _settings(Settings(), technique, samples, assignments)

@@ -209,3 +209,26 @@ def report_command(scenes, techniques, sweep, peers, effects, reference_samples,
         console.print(f"wrote {path}")
     if len(written) > 1:
         console.print(f"wrote {len(written) - 1} chart pictures in {output / 'charts'}")
+
+
+def certify_command(scene: Path, bscene, reference_samples: int) -> None:
+    """Print the certificate of a scene that is open in Blender."""
+    from .cli import _sync
+    from .compare.certificate import certify
+    from .compare.references import reference
+    from .host import cycles, properties
+
+    plain, size = _sync(bscene)
+    settings = properties.read(bscene)
+    kind = "R1" if settings.bounces <= 1 else "Rinf"
+
+    def run_cycles(bounces: int, count: int, seed: int):
+        cycles.set_up(bscene, cycles.Reference(bounces, count, seed))
+        return {n: p[..., :3] for n, p in cycles.render_passes(bscene, ("Combined",)).items()}
+
+    with console.status(f"{scene.name}: Cycles reference"):
+        halves = reference(kind, plain.digest(), size, reference_samples, ("Combined",), run_cycles)
+    with console.status("certifying") as status:
+        result = certify(plain, settings, size, {kind: halves}, progress=status.update)
+    click.echo(f"{scene.name}, {size[0]} × {size[1]} pixels, {plain.triangle_count()} triangles")
+    click.echo(result.text())

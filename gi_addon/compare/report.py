@@ -232,8 +232,11 @@ def _scene_html(index: int, scene: Measured, drawn: dict[str, object]) -> tuple[
     return "".join(parts), pictures
 
 
-def write(folder: Path, head: dict, scenes: list[Measured], extra: str = "") -> tuple[list[Path], list[str]]:
-    """report.html and the charts as pictures in ``folder``; returns files and notes. ``extra`` is HTML put at the end."""
+def write(
+    folder: Path, head: dict, scenes: list[Measured], extra: str = "", *, images: bool = True
+) -> tuple[list[Path], list[str]]:
+    """report.html and, with ``images``, the charts as pictures in ``folder``; returns files and notes. ``extra`` is HTML
+    put at the end."""
     folder.mkdir(parents=True, exist_ok=True)
     drawn = figures(scenes)
     bodies, walls = [], []
@@ -252,5 +255,5 @@ def write(folder: Path, head: dict, scenes: list[Measured], extra: str = "") -> 
     script = f"const WALLS = {data};\n{(Path(__file__).parent / 'wall.js').read_text()}"
     path = folder / "report.html"
     path.write_text(document("Quartet report", top + "".join(bodies) + extra, charts=True, scripts=script))
-    files, note = charts.write_images(drawn, folder / "charts")
+    files, note = charts.write_images(drawn, folder / "charts") if images and drawn else ([], "")
     return [path, *files], [note] if note else []

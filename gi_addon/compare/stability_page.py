@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from .page import chart, data_uri, document, esc, number, picture, table
-from .stability import ERROR, FAIL, NATURE, NOT_APPLICABLE, PASS, REPORTED, TESTS, Curve, Finding
+from .stability import ERROR, FAIL, KNOWN, NATURE, NOT_APPLICABLE, PASS, REPORTED, TESTS, Curve, Finding
 
 _CLASS = {PASS: "pass", FAIL: "fail", NATURE: "nature", NOT_APPLICABLE: "na", REPORTED: "reported", ERROR: "error"}
 
@@ -58,7 +58,11 @@ def page(results: dict[str, dict[str, Finding]], data: dict) -> str:
             if finding is None:
                 continue
             parts.append(f"<h3>{technique}: {_badge(finding)}</h3>")
-            notes = [f"Why it cannot pass: {finding.nature}." if finding.verdict == NATURE else "", finding.note]
+            notes = [
+                f"Why it cannot pass: {finding.nature}." if finding.verdict == NATURE else "",
+                finding.note,
+                f"Known: {KNOWN[technique, key]}." if finding.verdict == FAIL and (technique, key) in KNOWN else "",
+            ]
             parts.append("".join(f"<p class=quiet>{esc(n)}</p>" for n in notes if n))
             if finding.quantities:
                 parts.append(
