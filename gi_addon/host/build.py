@@ -19,6 +19,7 @@ _NODES = {
     "ADD_SHADER": "ShaderNodeAddShader", "TEX_CHECKER": "ShaderNodeTexChecker", "RGB": "ShaderNodeRGB",
     "VALUE": "ShaderNodeValue", "TEX_COORD": "ShaderNodeTexCoord", "MAPPING": "ShaderNodeMapping",
     "SUBSURFACE_SCATTERING": "ShaderNodeSubsurfaceScattering", "VOLUME_SCATTER": "ShaderNodeVolumeScatter",
+    "VOLUME_ABSORPTION": "ShaderNodeVolumeAbsorption", "PRINCIPLED_VOLUME": "ShaderNodeVolumePrincipled",
 }  # fmt: skip
 
 
