@@ -121,7 +121,7 @@ def make(tree, kind: str, output, sockets=(), **settings):
     for name, value in settings.items():
         setattr(node, name, value)
     for name, value in dict(sockets).items():
-        socket = next(s for s in node.inputs if s.identifier == name or s.name == name and s.enabled)
+        socket = next(s for s in node.inputs if s.identifier == name or (s.name == name and s.enabled))
         if hasattr(value, "is_output"):
             tree.links.new(value, socket)
         else:
@@ -365,8 +365,8 @@ def test_map_range_clamp_rotate_mapping_and_transform(blender, gl):
                                           clamp_type=kind))  # fmt: skip
     for kind, invert in itertools.product(("AXIS_ANGLE", "X_AXIS", "Y_AXIS", "Z_AXIS", "EULER_XYZ"), (False, True)):
         sockets = {"Center": (0.2, -0.1, 0.3), "Axis": (0.3, 1.0, -0.4), "Angle": 0.8, "Rotation": (0.4, -0.7, 1.1)}
-        sockets = {k: v for k, v in sockets.items() if k == "Center" or (k == "Rotation") == (kind == "EULER_XYZ")
-                   and (k != "Axis" or kind == "AXIS_ANGLE")}  # fmt: skip
+        sockets = {k: v for k, v in sockets.items() if k == "Center" or ((k == "Rotation") == (kind == "EULER_XYZ")
+                   and (k != "Axis" or kind == "AXIS_ANGLE"))}  # fmt: skip
         grid.color(f"rotate {kind} {invert}", case("VectorRotate", "Vector", sockets, rotation_type=kind, invert=invert))
     for kind in ("POINT", "TEXTURE", "VECTOR", "NORMAL"):
         sockets = {"Location": (0.2, -0.3, 0.1), "Rotation": (0.4, -0.7, 1.1), "Scale": (1.5, 0.6, -0.8)}

@@ -162,18 +162,18 @@ def closed_forms(
             else f"set to {settings.bounces}" + (f", at most {limit}" if limit < needed else "")
         )
         lines.append(f"bounces {needed}: smallest D with ρ_p95^D ≤ {LIGHT_TOLERANCE:g} at ρ_p95 = {albedo:.2f} ({state})")
-    if traits.grid and has_setting(traits.grid):
+    if has_setting(traits.blockers):
         bounds = scene.bounds()
         extent = float((bounds[1] - bounds[0]).max())
-        resolution = int(settings.get(traits.grid))
+        resolution = int(settings.get(traits.blockers))
         if wall and wall_limit and math.isfinite(wall_limit):
             asked = math.ceil(extent * wall_limit / wall)
             state = "holds" if resolution >= asked else f"set to {resolution}"
             lines.append(
-                f"{traits.grid} {asked}: cell ≤ thinnest wall / w* = {wall:.3g} m / {wall_limit:g}, over {extent:.3g} m ({state})"
+                f"{traits.blockers} {asked}: cell ≤ thinnest wall / w* = {wall:.3g} m / {wall_limit:g}, over {extent:.3g} m ({state})"
             )
         elif wall:
-            lines.append(f"{traits.grid}: no cell size keeps light out of walls (w* was not reached up to 4 cells)")
+            lines.append(f"{traits.blockers}: no cell size keeps light out of walls (w* was not reached up to 4 cells)")
         path = f"{settings.technique.lower()}.iterations"
         if has_setting(path):
             lines.append(f"{path} {resolution}: the scene's extent in cells (set to {settings.get(path)})")
@@ -304,11 +304,11 @@ def predictions(
             f"with {settings.bounces} bounce{'s' * (settings.bounces != 1)} a closed room of this mean albedo ({mean:.2f}) lacks "
             f"{100 * missing:.0f} % of its indirect light"
         )
-    if not traits.visibility:
+    if not traits.blockers or (settings.as_dict().get("rsm.visibility") == "NONE" and settings.technique == "RSM"):
         out.append(f"bounced light passes through walls (stability test 5: {100 * leak:.1f} % leak at a wall of two cells)")
-    elif traits.grid and wall and limit:
+    elif has_setting(traits.blockers) and wall and limit:
         bounds = scene.bounds()
-        cell = float((bounds[1] - bounds[0]).max()) / float(settings.get(traits.grid))
+        cell = float((bounds[1] - bounds[0]).max()) / float(settings.get(traits.blockers))
         if wall / cell < limit:
             out.append(f"walls of {wall:.3g} m are {wall / cell:.2g} cells thick and leak below w* = {limit:g} cells")
     if traits.screen_space:

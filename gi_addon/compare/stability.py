@@ -31,20 +31,21 @@ PASS, FAIL, NATURE, NOT_APPLICABLE, REPORTED, ERROR = "pass", "fail", "fail by n
 @dataclass(frozen=True)
 class Traits:
     """What a technique is made of, as far as tests must know: its grid, its light map, the setting that draws its random
-    set, whether it knows only the screen, whether it tests the visibility of what it gathers."""
+    set, what it tests visibility in (nothing: it does not), whether it knows only the screen, whether it carries flux
+    through a volume."""
 
     grid: str = ""
     map: str = ""
     set: str = ""
+    blockers: str = "geometry"
     screen_space: bool = False
-    visibility: bool = True
-    volume: bool = False  # propagates flux through a volume
+    volume: bool = False
 
 
 TRAITS: dict[str, Traits] = {
-    "RSM": Traits(map="rsm.resolution", set="rsm.samples", visibility=False),
-    "LPV": Traits(grid="lpv.resolution", volume=True),
-    "VCT": Traits(grid="vct.resolution"),
+    "RSM": Traits(map="rsm.resolution", set="rsm.samples", blockers="rsm.visibility_resolution"),
+    "LPV": Traits(grid="lpv.resolution", blockers="lpv.resolution", volume=True),
+    "VCT": Traits(grid="vct.resolution", blockers="vct.resolution"),
     "SSDO": Traits(set="ssdo.samples", screen_space=True),
 }
 
@@ -151,8 +152,8 @@ class Suite:
         self.studio = Studio()
         # Coarse structures keep software OpenGL in time; test 13 is the one about their size.
         self.base: dict[str, Any] = {}
-        for path, value in ((self.traits.grid, 32), (self.traits.map, 256)):
-            if path and not full:
+        for path, value in ((self.traits.blockers, 32), (self.traits.grid, 32), (self.traits.map, 256)):
+            if has_setting(path) and not full:
                 self.base[path.replace(".", "__")] = value
 
     def close(self) -> None:
@@ -175,12 +176,11 @@ class Suite:
         return self.render(scene, "Diffuse Indirect", **values).passes["Diffuse Indirect"].astype("f8")
 
     def cell(self, scene: Scene) -> float:
-        """Side of a grid cell in metres where the technique has a grid; 1/64 of the scene otherwise."""
+        """Side in metres of a cell of what the technique tests visibility in; 1/64 of the scene where it has none."""
         bounds = scene.bounds()
         extent = float((bounds[1] - bounds[0]).max())
-        if self.traits.grid and has_setting(self.traits.grid):
-            return extent / float(self.settings().get(self.traits.grid))
-        return extent / 64.0
+        path = self.traits.blockers
+        return extent / float(self.settings().get(path)) if has_setting(path) else extent / 64.0
 
 
 @dataclass(frozen=True)

@@ -187,15 +187,18 @@ def flux(suite: Suite) -> Finding:
     """Light that spreads inside a closed white sphere: what a receiver in its middle region gets must not grow or fade
     with the number of iterations once it has arrived; a further bounce adds at most ρ times the one before."""
     path = f"{suite.technique.lower()}.iterations"
-    if not suite.traits.volume or not has_setting(path):
+    if not suite.traits.volume:
         return not_applicable("nothing is propagated")
-    counts = (1, 2, 4, 8, 16, 32, 64) if suite.full else (8, 16, 32)
+    out = Finding()
+    # Without a number of iterations light crosses the whole grid: then its cells are the steps.
+    path = path if has_setting(path) else suite.traits.grid
+    counts = (8, 16, 32, 64) if suite.full else (16, 32)
     scene = scenes.integrating_sphere(albedo=0.5, power=100.0)
     exact = 0.5 * 100.0 / (4 * np.pi) / np.pi
     name = path.replace(".", "__")
     gains = [float(_gray(suite.indirect(scene, samples=1, use_ao=False, **{name: n})).mean()) / exact for n in counts]
     settled = [g for n, g in zip(counts, gains, strict=True) if n >= 16]
-    out = Finding([within("Φ(N)/Φ(16), N ≥ 16", v / settled[0], 0.99, 1.01) for v in settled[1:]])
+    out.quantities = [within(f"Φ(N)/Φ(16), N = {path} ≥ 16", v / settled[0], 0.99, 1.01) for v in settled[1:]]
     out.quantities.append(at_most("largest Φ_N over the exact one", max(gains), 1.01))
     high = int(next(m.high for p, _, m in walk() if p == "bounces"))
     if high >= 2:
@@ -205,7 +208,7 @@ def flux(suite: Suite) -> Finding:
         steps = np.diff([0.0, *means])
         ratios = steps[1:] / steps[:-1]
         out.quantities.append(at_most("largest Φ_{n+1}/Φ_n over bounces (ρ = .5)", float(ratios.max()), 0.5))
-    out.curves = [Curve("Flux by iterations", "iterations", "E / E exact", [float(n) for n in counts], {"Φ": gains}, log_x=True)]
+    out.curves = [Curve("Flux by steps", path, "E / E exact", [float(n) for n in counts], {"Φ": gains}, log_x=True)]
     return out
 
 
@@ -278,7 +281,7 @@ def thin_wall(suite: Suite) -> Finding:
             log_x=True,
         )
     ]
-    if not suite.traits.visibility:
+    if not suite.traits.blockers:
         out.nature = _BLIND
     elif suite.traits.screen_space:
         out.nature = "what a wall hides from the camera does not block"

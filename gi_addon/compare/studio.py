@@ -29,6 +29,8 @@ def settings_for(technique: str, **values: Any) -> Settings:
 
 def has_setting(path: str) -> bool:
     """Whether there is a setting of that dotted name."""
+    if not path:
+        return False
     try:
         Settings().get(path)
     except SettingError:

@@ -6,15 +6,15 @@ from __future__ import annotations
 import itertools
 from dataclasses import dataclass
 
-from ..settings import Settings
+from ..settings import Settings, walk
 from .studio import has_setting, settings_for
 
 # Axes besides `samples`, the sub-frames that every technique averages. A setting that a version lacks is left out.
 AXES: dict[str, dict[str, tuple]] = {
-    "RSM": {"rsm.samples": (50, 200, 800), "gather_scale": (4, 1), "rsm.resolution": (256, 512)},
-    "LPV": {"lpv.resolution": (16, 32, 64), "lpv.iterations": (8, 16, 32)},
-    "VCT": {"vct.resolution": (32, 64, 128), "vct.cones": (5, 9)},
-    "SSDO": {"ssdo.samples": (4, 16, 64), "gather_scale": (4, 1)},
+    "RSM": {"rsm.samples": (50, 200, 800), "gather_scale": (4, 1), "rsm.visibility": ("CELLS", "NONE"), "bounces": (1, 3)},
+    "LPV": {"lpv.resolution": (16, 32, 64), "lpv.directions": ("48", "72"), "bounces": (1, 3)},
+    "VCT": {"vct.resolution": (32, 64, 128), "vct.cones": (6, 16), "bounces": (1, 3)},
+    "SSDO": {"ssdo.samples": (64, 256), "ssdo.integrator": ("BITMASK", "RAYS"), "gather_scale": (4, 1), "bounces": (1, 3)},
 }
 SUBFRAMES = {"none": (), "quick": (1, 4, 16), "full": (1, 2, 4, 8, 16, 32, 64)}
 CYCLES_SAMPLES = {"none": (1, 16), "quick": (1, 4, 16), "full": (1, 2, 4, 8, 16, 32, 64)}
@@ -59,7 +59,12 @@ def technique_sweep(technique: str, sweep: str) -> list[Candidate]:
         return [Candidate(technique, ())]
     subframes = SUBFRAMES[sweep]
     default = Settings()
-    axes = {k: v for k, v in AXES.get(technique, {}).items() if has_setting(k)}
+    limits = {path: meta for path, _, meta in walk()}
+    axes = {
+        k: tuple(v for v in values if not isinstance(v, int) or limits[k].low <= v <= limits[k].high)
+        for k, values in AXES.get(technique, {}).items()
+        if has_setting(k)
+    }
     found = [_candidate(technique, {"samples": n}) for n in subframes]
     if sweep == "quick":
         for name, values in axes.items():
