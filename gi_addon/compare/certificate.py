@@ -170,7 +170,8 @@ def closed_forms(
             asked = math.ceil(extent * wall_limit / wall)
             state = "holds" if resolution >= asked else f"set to {resolution}"
             lines.append(
-                f"{traits.blockers} {asked}: cell ≤ thinnest wall / w* = {wall:.3g} m / {wall_limit:g}, over {extent:.3g} m ({state})"
+                f"{traits.blockers} {asked}: cell ≤ thinnest wall / w* = {wall:.3g} m / {wall_limit:g}, over {extent:.3g} m "
+                f"({state})"
             )
         elif wall:
             lines.append(f"{traits.blockers}: no cell size keeps light out of walls (w* was not reached up to 4 cells)")

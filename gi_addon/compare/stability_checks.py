@@ -158,7 +158,7 @@ def bounces(suite: Suite) -> Finding:
     return out
 
 
-@test("3", "White furnace", "a convex body, ρ = 1, in L = 1 has radiance 1: mean; max")
+@test("3", "White furnace", "a convex body, ρ = 1, in L = 1 has radiance 1: mean; max", fast=False)
 def white_furnace(suite: Suite) -> Finding:
     """All light is the sky's: any other value is energy made or lost. Swept over the technique's own sizes."""
     out = Finding()
