@@ -49,7 +49,17 @@ class Facts:
 
     @property
     def lit(self) -> bool:
-        return bool(self.rig.sources)
+        return bool(self.rig.sources) or (self.screen_sources and (self.emissive_light or not self.world_black))
+
+    @property
+    def emissive_light(self) -> bool:
+        """Whether what emits also lights."""
+        return self.emissive and self.settings.use_area_lights
+
+    @property
+    def screen_sources(self) -> bool:
+        """Whether the world and emissive surfaces light what they do on the screen, not as lights with maps."""
+        return self.settings.technique == "SSDO" and self.settings.ssdo.sources == "SCREEN"
 
 
 def gather_facts(
@@ -65,11 +75,12 @@ def gather_facts(
     """Look at everything once."""
     bounds = scene.bounds()
     s = settings
+    from_screen = s.technique == "SSDO" and s.ssdo.sources == "SCREEN"
     rig = build_rig(
         scene.lights, bounds,
-        world=world, world_samples=s.world.samples,
-        emitters=emitters, emitter_samples=_EMITTER_SAMPLES, area_lights=s.use_area_lights,
-        shadows=s.use_shadows, bounces=s.use_indirect_diffuse and s.bounces > 0,
+        world=None if from_screen else world, world_samples=s.world.samples,
+        emitters=Emitters.none() if from_screen else emitters, emitter_samples=_EMITTER_SAMPLES, area_lights=s.use_area_lights,
+        shadows=s.use_shadows, bounces=s.use_indirect_diffuse and s.bounces > 0 and s.technique != "SSDO",
         shadow_resolution=s.shadows.resolution, bounce_resolution=s.rsm.resolution,
         world_resolution=s.world.resolution,
     )  # fmt: skip

@@ -52,7 +52,10 @@ def _group(cls: type) -> Any:
     return field(default_factory=cls)
 
 
-TECHNIQUES = (("RSM", "Reflective Shadow Maps", "One bounce gathered from virtual point lights on what the lights see"),)
+TECHNIQUES = (
+    ("RSM", "Reflective Shadow Maps", "One bounce gathered from virtual point lights on what the lights see"),
+    ("SSDO", "Screen-Space Directional Occlusion", "Bounces gathered from what the camera sees"),
+)
 
 
 @dataclass
@@ -120,6 +123,39 @@ class RSMSettings:
 
 
 @dataclass
+class SSDOSettings:
+    """Screen-space directional occlusion (Ritschel, Grosch and Seidel 2009)."""
+
+    samples: int = _setting(
+        256, "Samples", "Points tested in the depth buffer per gathering pixel, sub-frame and bounce", low=8, high=4096,
+        higher="less noise", lower="faster",
+    )  # fmt: skip
+    steps: int = _setting(
+        16, "Steps", "How many of the samples lie along one ray, or on one side of one slice", low=2, high=256,
+        higher="finds thin and far things; fewer directions", lower="more directions; misses small things",
+    )  # fmt: skip
+    integrator: str = _setting(
+        "BITMASK", "Integrator", "How directions are covered",
+        choices=(("RAYS", "Rays", "Cosine-distributed rays, each followed to its first hit"),
+                 ("BITMASK", "Visibility Bitmask", "Slices of the hemisphere in 32 sectors that samples fill")),
+    )  # fmt: skip
+    radius: float = _setting(
+        0.0, "Radius", "How far away light is gathered from; 0 is everywhere on the screen", low=0.0, high=1e6,
+        soft_high=100.0, unit="m", higher="light from farther away", lower="finer near by, dark rooms",
+    )  # fmt: skip
+    thickness: float = _setting(
+        0.5, "Thickness", "How thick what the screen shows is taken to be, as a share of its distance from the receiver",
+        low=0.01, high=10.0, higher="fewer leaks behind things", lower="light passes behind thin things",
+    )  # fmt: skip
+    sources: str = _setting(
+        "MAPS", "World and Emitters", "How the world and emissive surfaces light the scene",
+        choices=(("MAPS", "Shadow Maps", "As lights with shadow maps, on and off the screen"),
+                 ("SCREEN", "Screen", "Directional occlusion: directions that meet nothing on the screen see the world, the "
+                  "others the emissive pixels")),
+    )  # fmt: skip
+
+
+@dataclass
 class Settings:
     """All of ``scene.quartet``."""
 
@@ -140,7 +176,7 @@ class Settings:
         soft_high=256, higher="smoother after a while", lower="settles sooner",
     )  # fmt: skip
     bounces: int = _setting(
-        1, "Bounces", "Diffuse bounces of light; 1 is the paper's", low=0, high=1,
+        1, "Bounces", "Diffuse bounces of light; 1 is the paper's", low=0, high=8,
         higher="brighter interiors", lower="0 is direct light only",
     )  # fmt: skip
     gather_scale: int = _setting(
@@ -160,6 +196,7 @@ class Settings:
     ao: AOSettings = _group(AOSettings)
     world: WorldSettings = _group(WorldSettings)
     rsm: RSMSettings = _group(RSMSettings)
+    ssdo: SSDOSettings = _group(SSDOSettings)
 
     # -- access by dotted name ---------------------------------------------------------------------------------
 

@@ -76,6 +76,9 @@ void main()
 #endif
         }
         diffuse = lit_light * INV_PI;
+#if HAS_SCREEN_LIGHT
+        diffuse += texelFetch(screen_light, pixel, 0).rgb; // the world and emissive pixels, where screen space gathers them
+#endif
     }
 #if HAS_DIRECT_DIFFUSE
     direct_diffuse = vec4(diffuse, 1.0);

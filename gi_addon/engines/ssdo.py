@@ -1,0 +1,204 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Screen-space directional occlusion, Figure 4d of the paper.
+
+T. Ritschel, T. Grosch and H.-P. Seidel, "Approximating Dynamic Global Illumination in Image Space", I3D 2009. What the
+camera sees is all the geometry there is: each pixel gathers the light that the other pixels reflect, along rays through the
+depth buffer or over slices with a visibility bitmask. What lies outside the picture, or behind something, sends nothing.
+"""
+
+from __future__ import annotations
+
+from ..facts import Facts
+from ..frame import Frame
+from ..gpu_scene import world_source
+from ..graph import Optional, Pass, Planned, Texture, Uniform
+from ..passes.ao import AOBlur, AOGeneration
+from ..passes.brdf_tables import BRDFTables
+from ..passes.direct_lighting import DirectLighting
+from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentTint, _screen, gather_size
+from ..passes.lights import LightList, ShadowMaps
+from ..passes.resolve import Resolve
+from ..settings import Settings
+
+
+def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
+    """Figure 4d, in order; each further bounce repeats the gather."""
+    bounces = []
+    for bounce in range(1, settings.bounces + 1):
+        last = bounce == settings.bounces
+        bounces += [
+            SentLight(bounce),
+            InterpolatedIndirect(f"ssdo.sent.{bounce}", f"ssdo.low.{bounce}"),
+            IndirectLighting(f"ssdo.sent.{bounce}", f"ssdo.low.{bounce}",
+                             "indirect.diffuse" if last else f"ssdo.bounce.{bounce}"),
+        ]  # fmt: skip
+    return [
+        BRDFTables(),
+        LightList(),
+        ShadowMaps(),
+        GBuffer(),
+        TranslucentTint(),
+        GBufferMips(),
+        ScreenPlanes(),
+        AOGeneration(),
+        AOBlur(),
+        InterpolatedIndirect("gbuffer.emission", "screen.low"),
+        IndirectLighting("gbuffer.emission", "screen.low", "screen.light"),
+        DirectLighting(),
+        *bounces,
+        Resolve(layers),
+    ]
+
+
+# What a gather takes, and what it makes (gather_lib.glsl, lighting_frag.glsl).
+_SENT = {"SENT_NOTHING": 0, "SENT_BOUNCE": 1, "SENT_EMISSION": 2}
+_TARGET = {"TARGET_INDIRECT": 0, "TARGET_BOUNCE": 1, "TARGET_SCREEN_LIGHT": 2}
+_LIGHT = "radiance a white Lambert surface would reflect, W/(m²·sr)"
+
+
+def _no_bounce(facts: Facts) -> str | None:
+    if not facts.settings.use_indirect_diffuse:
+        return "indirect diffuse is switched off"
+    return "no visible material is diffuse" if not facts.diffuse else None
+
+
+class ScreenPlanes(Pass):
+    """The depth buffer in a form in which planes and rays are linear."""
+
+    title = "SSDO Planes"
+    reads = ("gbuffer.depth", "gbuffer.normal")
+    writes = (
+        Texture("ssdo.planes", "ssdo_planes", "nearness of the visible surface (1/view depth; orthographic: −view depth) and "
+                "its slope per pixel of the surface's plane", "rgba32f", _screen),
+    )  # fmt: skip
+    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/ssdo/planes_frag.glsl"}}
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        frame.screen(planned, frame.program(planned))
+
+
+class SentLight(Pass):
+    """What each pixel sends on: direct light, and the bounce before this one."""
+
+    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/ssdo/sent_frag.glsl"}}
+
+    def __init__(self, bounce: int) -> None:
+        self.title = f"SSDO Sent Light {bounce}"
+        self.bounce = bounce
+        before = (Optional(f"ssdo.bounce.{bounce - 1}"),) if bounce > 1 else ()
+        self.reads = ("direct.diffuse", "gbuffer.diffuse", *before)
+        self.writes = (
+            Texture(f"ssdo.sent.{bounce}", "ssdo_sent", "radiance that leaves the surface, W/(m²·sr)", "rgba32f", _screen),
+        )
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return {} if self.bounce > 1 else {"HAS_LAST_BOUNCE": 0}
+
+    def absent(self, facts: Facts) -> str | None:
+        return _no_bounce(facts)
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        frame.screen(planned, frame.program(planned))
+
+
+class _Gather(Pass):
+    """Light from the screen: ``sent`` is the radiance that pixels send, or their emission, which comes with the world's light."""
+
+    uniforms = (
+        Uniform("ssdo_directions", "int", "directions (rays) or slices (bitmask) per pixel"),
+        Uniform("ssdo_steps", "int", "depth tests along each ray, or each side of a slice"),
+        Uniform("ssdo_radius", "float", "how far light is gathered from, world units; 0 = everywhere"),
+        Uniform("ssdo_thickness", "float", "thickness of what the screen shows, as a share of its distance from the receiver"),
+    )
+    sent = ""
+
+    @property
+    def from_sources(self) -> bool:
+        return not self.sent.startswith("ssdo.")
+
+    def absent(self, facts: Facts) -> str | None:
+        if not self.from_sources:
+            return _no_bounce(facts)
+        if not facts.screen_sources:
+            return "the world and emissive surfaces shine through shadow maps"
+        return None if facts.emissive_light or not facts.world_black else "the world is black and nothing emits"
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        emits = self.from_sources and facts.emissive_light
+        return {
+            **_SENT,
+            "SENT": _SENT["SENT_EMISSION" if emits else "SENT_NOTHING" if self.from_sources else "SENT_BOUNCE"],
+            "GATHER_WORLD": int(self.from_sources and not facts.world_black),
+            "GATHER_SCALE": facts.settings.gather_scale,
+            "SSDO_RAYS": int(facts.settings.ssdo.integrator == "RAYS"),
+        }
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        settings = planned.facts.settings.ssdo
+        units = len(planned.texture_reads())
+        world = bool(self.defines(planned.facts)["GATHER_WORLD"])
+        virtual = {"generated/world.glsl": world_source(frame.gpu.world, units) if world else "// no world\n"}
+        program = frame.program(planned, virtual=virtual)
+        if world:
+            frame.gpu.bind_world_params()
+            frame.gpu.bind_images(frame.gpu.world, units)
+        per_direction = settings.steps * (1 if settings.integrator == "RAYS" else 2)
+        frame.set(
+            program,
+            ssdo_directions=max(1, settings.samples // per_direction),
+            ssdo_steps=settings.steps,
+            ssdo_radius=settings.radius,
+            ssdo_thickness=settings.thickness,
+        )
+        frame.screen(planned, program)
+        if world:
+            frame.gpu.unbind_images(units, len(frame.gpu.world.images))
+
+
+class InterpolatedIndirect(_Gather):
+    """Light from the screen at one pixel per block."""
+
+    figure = "SSDO Interpolated Indirect Lighting Computation"
+    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/ssdo/gather_low_frag.glsl"}}
+
+    def __init__(self, sent: str, low: str) -> None:
+        self.sent = sent
+        self.title = f"{_title(sent)} (low resolution)"
+        self.reads = ("ssdo.planes", _read(sent), "gbuffer.low_depth", "gbuffer.low_normal", "gbuffer.low_pixel")
+        self.writes = (
+            Texture(low, "low_indirect", _LIGHT, "rgba32f", gather_size, scratch=True),
+            Texture(f"{low}.direction", "low_direction", "Σ luminance × direction, and Σ luminance, of what arrives", "rgba32f",
+                    gather_size, scratch=True),
+        )  # fmt: skip
+
+    def absent(self, facts: Facts) -> str | None:
+        return super().absent(facts) or (None if facts.settings.gather_scale > 1 else "every pixel gathers for itself")
+
+
+class IndirectLighting(_Gather):
+    """Light from the screen for every pixel: interpolated where the low resolution has its surface, gathered where not."""
+
+    figure = "SSDO Lighting Computation"
+    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/ssdo/lighting_frag.glsl"}}
+
+    def __init__(self, sent: str, low: str, target: str) -> None:
+        self.sent = sent
+        self.title = _title(sent)
+        self.target = {"indirect.diffuse": "INDIRECT", "screen.light": "SCREEN_LIGHT"}.get(target, "BOUNCE")
+        self.reads = (
+            "ssdo.planes", _read(sent), "gbuffer.depth", "gbuffer.normal", Optional("gbuffer.low_depth"),
+            Optional("gbuffer.low_normal"), Optional("gbuffer.low_pixel"), Optional(low), Optional(f"{low}.direction"),
+        )  # fmt: skip
+        glsl = {"INDIRECT": "indirect_diffuse", "SCREEN_LIGHT": "screen_light", "BOUNCE": "last_bounce"}[self.target]
+        self.writes = (Texture(target, glsl, _LIGHT, "rgba32f", _screen),)
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return {**super().defines(facts), **_TARGET, "TARGET": _TARGET[f"TARGET_{self.target}"]}
+
+
+def _title(sent: str) -> str:
+    return f"SSDO Bounce {sent.rsplit('.', 1)[1]}" if sent.startswith("ssdo.") else "SSDO Directional Occlusion"
+
+
+def _read(sent: str) -> str | Optional:
+    return sent if sent.startswith("ssdo.") else Optional(sent)

@@ -1,0 +1,161 @@
+// Light from what the screen shows: over cosine-distributed rays, or over slices with a visibility bitmask. Included where
+// `ssdo_planes` and the radiance that leaves each pixel (`ssdo_sent`, or `gbuf_emission`) are declared.
+//
+// Rays: direction pdf cosθ/π, so E/π is the mean radiance the rays find (T. Ritschel et al., "Approximating Dynamic Global
+// Illumination in Image Space", I3D 2009, with a march in place of one point per ray: their point is inside some geometry
+// or not, and what light it then sends is a guess). A sender sends from its front only. Where GATHER_WORLD is 1 a direction
+// that meets nothing takes the world's light: directional occlusion.
+
+#include "engines/ssdo/screen_lib.glsl"
+#include "lib/sequence_lib.glsl"
+#if SSDO_RAYS
+#include "engines/ssdo/march_lib.glsl"
+#else
+#include "engines/ssdo/scan_lib.glsl"
+#endif
+#if GATHER_WORLD
+#include "generated/world.glsl"
+#endif
+
+// Radiance that leaves a pixel's surface towards any side, W/(m²·sr).
+vec3 sent_from(ivec2 pixel)
+{
+#if SENT == SENT_BOUNCE
+    return texelFetch(ssdo_sent, pixel, 0).rgb;
+#elif SENT == SENT_EMISSION
+    return texelFetch(gbuf_emission, pixel, 0).rgb;
+#else
+    return vec3(0.0);
+#endif
+}
+
+struct Gathered {
+    vec3 radiance;    // E/π, W/(m²·sr)
+    vec4 direction;   // Σ luminance × direction; Σ luminance
+};
+
+// Light per direction is light per projected direction over the cosine. That only steers the interpolation between normals
+// 25° apart, so it need not follow the last 3° above the horizon, where it is all noise.
+const float LEAST_COS = 0.05;
+
+void add_light(inout Gathered g, vec3 light, vec3 direction, float cos_n)
+{
+    g.radiance += light;
+    g.direction += vec4(direction, 1.0) * (luminance(light) * PI / max(cos_n, LEAST_COS));
+}
+
+Gathered gather_screen(vec3 position_ws, vec3 n, vec3 ng, vec3 v, uint seed)
+{
+    Gathered g = Gathered(vec3(0.0), vec4(0.0));
+    float reach = ssdo_radius > 0.0 ? ssdo_radius : 2.0 * view.scene_radius;
+    vec2 turn = vec2(unit_float(seed), unit_float(hash_u32(seed)));
+    vec2 jitters = sobol_2d(view.subframe, 41u);
+#if SSDO_RAYS
+    mat3 frame = frame_from_normal(n);
+    for (int i = 0; i < ssdo_directions; ++i) {
+        vec3 local = warp_cosine_hemisphere(fract(sobol_2d(view.subframe * uint(ssdo_directions) + uint(i), 40u) + turn));
+        vec3 direction = frame * local;
+        if (dot(direction, ng) > 0.0) {
+            float jitter = fract(jitters.x + turn.x + 0.618034 * float(i)); // golden ratio: even at every count
+            ScreenHit hit = march(position_ws, direction, reach, ssdo_steps, ssdo_thickness, jitter);
+            if (hit.found && faces(hit.pixel, screen_from_ws(position_ws))) {
+                add_light(g, sent_from(hit.pixel), direction, local.z);
+            }
+#if GATHER_WORLD
+            if (!hit.found) {
+                add_light(g, world_radiance(direction), direction, local.z);
+            }
+#endif
+        }
+    }
+#else
+    mat3 frame = frame_from_normal(v);
+    vec3 origin = screen_from_ws(position_ws);
+    vec4 c = view.clip_from_world * vec4(position_ws, 1.0);
+    for (int i = 0; i < ssdo_directions; ++i) {
+        vec2 u = fract(sobol_2d(view.subframe * uint(ssdo_directions) + uint(i), 40u) + turn);
+        float phi = PI * u.x;
+        vec3 t = frame * vec3(cos(phi), sin(phi), 0.0);
+        Slice slice = make_slice(n, v, t, u.y);
+        float horizon = atan(dot(ng, t), max(dot(ng, v), 1e-6));
+        uint mask = ~sectors_between(slice, horizon - 0.5 * PI, horizon + 0.5 * PI);
+        vec4 ct = view.clip_from_world * vec4(t, 0.0);
+        vec2 along = (ct.xy * c.w - c.xy * ct.w) * view.resolution;
+        along *= inversesqrt(max(dot(along, along), 1e-37));
+        // The sample before, on the same side: plane, place on the screen and in the world, light.
+        vec4 last = vec4(NOTHING);
+        vec3 last_screen = origin;
+        vec3 last_ws = position_ws;
+        vec3 last_sent = vec3(0.0);
+        for (int k = 0; k < 2 * ssdo_steps; ++k) {
+            bool turned = k >= ssdo_steps;
+            float side = turned ? -1.0 : 1.0;
+            if (k == ssdo_steps) {
+                last = vec4(NOTHING);
+            }
+            float jitter = fract(jitters.x + turn.y + 0.618034 * float(2 * i + int(turned)));
+            float s = spacing(turned ? k - ssdo_steps : k, ssdo_steps, jitter);
+            vec2 p = origin.xy + along * (side * s * pixels_to_edge(origin.xy, along * side));
+            ivec2 pixel = ivec2(p);
+            vec4 plane = texelFetch(ssdo_planes, pixel, 0);
+            vec3 here = vec3(p, plane_at(plane, p));
+            vec3 here_ws = ws_from_screen(here);
+            vec3 d = here_ws - position_ws;
+            float distance = length(d);
+            if (plane.x > 0.5 * NOTHING && distance > 0.0 && distance <= reach) {
+                bool front = origin.z > plane.x + dot(plane.yz, origin.xy - (vec2(pixel) + 0.5));
+                vec3 sent = front ? sent_from(pixel) : vec3(0.0);
+                vec3 direction = d / distance;
+                float theta = slice_angle(d, v, side);
+                // First what lies between this sample and the one before it, if both are of one surface: half of each.
+                if (last.x > 0.5 * NOTHING) {
+                    float from_here = plane.x + dot(plane.yz, last_screen.xy - (vec2(pixel) + 0.5)) - last_screen.z;
+                    float from_there = last.x + dot(last.yz, p - (floor(last_screen.xy) + 0.5)) - here.z;
+                    float off = min(abs(from_here), abs(from_there));
+                    float per_depth = view.orthographic > 0.5 ? 1.0 : sqr(here.z);
+                    if (off <= SAME_SURFACE * per_depth * length(here_ws - last_ws)) {
+                        uint between = sectors_between(slice, theta, slice_angle(last_ws - position_ws, v, side)) & ~mask;
+                        mask |= between;
+                        float share = float(bitCount(between)) / SECTORS * slice.weight;
+                        add_light(g, 0.5 * (sent + last_sent) * share, direction, dot(direction, n));
+                    }
+                }
+                // Then what lies behind it, as thick as it is taken to be.
+                uint behind = sectors_between(slice, theta, slice_angle(d - v * (ssdo_thickness * distance), v, side)) & ~mask;
+                mask |= behind;
+                float share = float(bitCount(behind)) / SECTORS * slice.weight;
+                add_light(g, sent * share, direction, dot(direction, n));
+                last = plane;
+                last_screen = here;
+                last_ws = here_ws;
+                last_sent = sent;
+            } else {
+                last = vec4(NOTHING);
+            }
+        }
+#if GATHER_WORLD
+        // One of the open sectors stands for all of them.
+        uint open = ~mask;
+        int count = bitCount(open);
+        int pick = int(fract(u.y + 0.5 + turn.x) * float(count));
+        int found = 0;
+        for (int bit = 0; bit < 32; ++bit) {
+            if ((open >> uint(bit) & 1u) != 0u) {
+                if (pick == 0) {
+                    found = bit;
+                }
+                --pick;
+            }
+        }
+        if (count > 0) {
+            float theta = slice_middle(slice, found);
+            vec3 direction = v * cos(theta) + t * sin(theta);
+            add_light(g, world_radiance(direction) * (float(count) / SECTORS * slice.weight), direction, dot(direction, n));
+        }
+#endif
+    }
+#endif
+    g.radiance /= float(ssdo_directions);
+    g.direction /= float(ssdo_directions);
+    return g;
+}
