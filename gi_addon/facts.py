@@ -23,7 +23,7 @@ class Facts:
     """Facts about one frame. Reasons that passes give for their absence come from these."""
 
     settings: Settings
-    resolution: tuple[int, int]
+    resolution: tuple[int, int]  # of what is drawn: the picture and its margin
     outputs: tuple[str, ...]
     subframes: int
     rig: LightRig
@@ -40,12 +40,18 @@ class Facts:
     world_black: bool
     ao_distance: float
     medium: Medium | None = None  # that fills the world
+    margin: int = 0  # px drawn beyond each side of the picture
     stamps: dict[str, str] = field(default_factory=dict)
 
     @property
     def layers(self) -> tuple[str, ...]:
         """Film layers of the outputs."""
         return film_layers(self.outputs)
+
+    @property
+    def picture(self) -> tuple[int, int]:
+        """Size of the picture, px."""
+        return (self.resolution[0] - 2 * self.margin, self.resolution[1] - 2 * self.margin)
 
     @property
     def lit(self) -> bool:
@@ -72,7 +78,8 @@ def gather_facts(
     world: WorldMap | None,
     emitters: Emitters,
 ) -> Facts:
-    """Look at everything once."""
+    """Look at everything once. ``resolution`` is the picture's."""
+    margin = round(settings.ssdo.margin * max(resolution)) if settings.technique == "SSDO" else 0
     bounds = scene.bounds()
     s = settings
     from_screen = s.technique == "SSDO" and s.ssdo.sources == "SCREEN"
@@ -89,7 +96,8 @@ def gather_facts(
     some = [compiled[m] for m in used]
     return Facts(
         settings=s,
-        resolution=resolution,
+        resolution=(resolution[0] + 2 * margin, resolution[1] + 2 * margin),
+        margin=margin,
         outputs=outputs,
         subframes=subframes,
         rig=rig,

@@ -147,6 +147,10 @@ class SSDOSettings:
         0.5, "Thickness", "How thick what the screen shows is taken to be, as a share of its distance from the receiver",
         low=0.01, high=10.0, higher="fewer leaks behind things", lower="light passes behind thin things",
     )  # fmt: skip
+    margin: float = _setting(
+        0.0, "Margin", "How much is drawn beyond each side of the picture, as a share of its longer side: what lies there "
+        "still counts", low=0.0, high=1.0, higher="light from just outside", lower="faster",
+    )  # fmt: skip
     sources: str = _setting(
         "MAPS", "World and Emitters", "How the world and emissive surfaces light the scene",
         choices=(("MAPS", "Shadow Maps", "As lights with shadow maps, on and off the screen"),

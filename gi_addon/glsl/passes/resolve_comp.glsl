@@ -11,7 +11,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 
 void add(int layer, ivec2 pixel, vec4 value)
 {
-    ivec3 at = ivec3(pixel, layer);
+    ivec3 at = ivec3(pixel - view.margin, layer);
     // A number that is not one would stay in the film for good. Nothing upstream should make one; the non-finite scan of
     // the stability suite reads the passes before this point.
     value = mix(value, vec4(0.0), bvec4(!is_finite(value.x), !is_finite(value.y), !is_finite(value.z), !is_finite(value.w)));
@@ -24,6 +24,7 @@ void main()
     if (any(greaterThanEqual(pixel, imageSize(film).xy))) {
         return;
     }
+    pixel += view.margin; // the film holds the picture alone
     vec2 uv = (vec2(pixel) + 0.5) * view.inverse_resolution;
     float depth = 0.0;
 #if HAS_GBUF_DEPTH
@@ -108,7 +109,7 @@ void main()
 #if LAYER_DEPTH >= 0
     // The first sub-frame's depth, as Cycles keeps its first sample's: a mean of depths is no depth. Nothing is 1e10.
     if (first_subframe == 1) {
-        imageStore(film, ivec3(pixel, LAYER_DEPTH), vec4(surface ? depth : 1e10));
+        imageStore(film, ivec3(pixel - view.margin, LAYER_DEPTH), vec4(surface ? depth : 1e10));
     }
 #endif
 #if LAYER_NORMAL >= 0

@@ -49,6 +49,7 @@ Gathered gather_screen(vec3 position_ws, vec3 n, vec3 ng, vec3 v, uint seed)
     Gathered g = Gathered(vec3(0.0), vec4(0.0));
     float reach = ssdo_radius > 0.0 ? ssdo_radius : 2.0 * view.scene_radius;
     vec2 turn = vec2(unit_float(seed), unit_float(hash_u32(seed)));
+    vec3 origin = screen_from_ws(position_ws);
     vec2 jitters = sobol_2d(view.subframe, 41u);
 #if SSDO_RAYS
     mat3 frame = frame_from_normal(n);
@@ -58,7 +59,7 @@ Gathered gather_screen(vec3 position_ws, vec3 n, vec3 ng, vec3 v, uint seed)
         if (dot(direction, ng) > 0.0) {
             float jitter = fract(jitters.x + turn.x + 0.618034 * float(i)); // golden ratio: even at every count
             ScreenHit hit = march(position_ws, direction, reach, ssdo_steps, ssdo_thickness, jitter);
-            if (hit.found && faces(hit.pixel, screen_from_ws(position_ws))) {
+            if (hit.found && faces(texelFetch(ssdo_planes, hit.pixel, 0), hit.pixel, origin)) {
                 add_light(g, sent_from(hit.pixel), direction, local.z);
             }
 #if GATHER_WORLD
@@ -70,7 +71,6 @@ Gathered gather_screen(vec3 position_ws, vec3 n, vec3 ng, vec3 v, uint seed)
     }
 #else
     mat3 frame = frame_from_normal(v);
-    vec3 origin = screen_from_ws(position_ws);
     vec4 c = view.clip_from_world * vec4(position_ws, 1.0);
     for (int i = 0; i < ssdo_directions; ++i) {
         vec2 u = fract(sobol_2d(view.subframe * uint(ssdo_directions) + uint(i), 40u) + turn);
@@ -82,55 +82,35 @@ Gathered gather_screen(vec3 position_ws, vec3 n, vec3 ng, vec3 v, uint seed)
         vec4 ct = view.clip_from_world * vec4(t, 0.0);
         vec2 along = (ct.xy * c.w - c.xy * ct.w) * view.resolution;
         along *= inversesqrt(max(dot(along, along), 1e-37));
-        // The sample before, on the same side: plane, place on the screen and in the world, light.
-        vec4 last = vec4(NOTHING);
-        vec3 last_screen = origin;
-        vec3 last_ws = position_ws;
-        vec3 last_sent = vec3(0.0);
         for (int k = 0; k < 2 * ssdo_steps; ++k) {
             bool turned = k >= ssdo_steps;
             float side = turned ? -1.0 : 1.0;
-            if (k == ssdo_steps) {
-                last = vec4(NOTHING);
-            }
+            int step_ = turned ? k - ssdo_steps : k;
             float jitter = fract(jitters.x + turn.y + 0.618034 * float(2 * i + int(turned)));
-            float s = spacing(turned ? k - ssdo_steps : k, ssdo_steps, jitter);
-            vec2 p = origin.xy + along * (side * s * pixels_to_edge(origin.xy, along * side));
+            float edge = pixels_to_edge(origin.xy, along * side);
+            vec2 way = along * (side * edge);
+            float s = spacing(step_, ssdo_steps, jitter);
+            vec2 p = origin.xy + way * s;
             ivec2 pixel = ivec2(p);
             vec4 plane = texelFetch(ssdo_planes, pixel, 0);
-            vec3 here = vec3(p, plane_at(plane, p));
-            vec3 here_ws = ws_from_screen(here);
-            vec3 d = here_ws - position_ws;
+            vec3 d = ws_from_screen(vec3(p, plane_near(plane, pixel, p))) - position_ws;
             float distance = length(d);
             if (plane.x > 0.5 * NOTHING && distance > 0.0 && distance <= reach) {
-                bool front = origin.z > plane.x + dot(plane.yz, origin.xy - (vec2(pixel) + 0.5));
-                vec3 sent = front ? sent_from(pixel) : vec3(0.0);
-                vec3 direction = d / distance;
+                // Its surface stands for the screen half-way to the samples before and after it.
+                float s_before = 0.5 * (s + (step_ > 0 ? spacing(step_ - 1, ssdo_steps, jitter) : 0.0));
+                float s_after = 0.5 * (s + (step_ + 1 < ssdo_steps ? spacing(step_ + 1, ssdo_steps, jitter) : 1.0));
                 float theta = slice_angle(d, v, side);
-                // First what lies between this sample and the one before it, if both are of one surface: half of each.
-                if (last.x > 0.5 * NOTHING) {
-                    float from_here = plane.x + dot(plane.yz, last_screen.xy - (vec2(pixel) + 0.5)) - last_screen.z;
-                    float from_there = last.x + dot(last.yz, p - (floor(last_screen.xy) + 0.5)) - here.z;
-                    float off = min(abs(from_here), abs(from_there));
-                    float per_depth = view.orthographic > 0.5 ? 1.0 : sqr(here.z);
-                    if (off <= SAME_SURFACE * per_depth * length(here_ws - last_ws)) {
-                        uint between = sectors_between(slice, theta, slice_angle(last_ws - position_ws, v, side)) & ~mask;
-                        mask |= between;
-                        float share = float(bitCount(between)) / SECTORS * slice.weight;
-                        add_light(g, 0.5 * (sent + last_sent) * share, direction, dot(direction, n));
-                    }
+                float before = slice_angle(surface_ws(plane, pixel, origin.xy + way * s_before) - position_ws, v, side);
+                float after = slice_angle(surface_ws(plane, pixel, origin.xy + way * s_after) - position_ws, v, side);
+                float behind = slice_angle(d - v * (ssdo_thickness * distance), v, side);
+                uint seen = sectors_between(slice, min(min(theta, behind), min(before, after)),
+                                            max(max(theta, behind), max(before, after))) & ~mask;
+                mask |= seen;
+                if (seen != 0u && faces(plane, pixel, origin)) {
+                    vec3 direction = d / distance;
+                    float share = float(bitCount(seen)) / SECTORS * slice.weight;
+                    add_light(g, sent_from(pixel) * share, direction, dot(direction, n));
                 }
-                // Then what lies behind it, as thick as it is taken to be.
-                uint behind = sectors_between(slice, theta, slice_angle(d - v * (ssdo_thickness * distance), v, side)) & ~mask;
-                mask |= behind;
-                float share = float(bitCount(behind)) / SECTORS * slice.weight;
-                add_light(g, sent * share, direction, dot(direction, n));
-                last = plane;
-                last_screen = here;
-                last_ws = here_ws;
-                last_sent = sent;
-            } else {
-                last = vec4(NOTHING);
             }
         }
 #if GATHER_WORLD

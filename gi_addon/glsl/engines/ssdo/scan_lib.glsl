@@ -6,13 +6,11 @@
 // θ from v towards T, n' the normal's projection into the slice, γ its angle (J. Jimenez et al., "Practical Realtime
 // Strategies for Accurate Indirect Occlusion", SIGGRAPH 2016 course, §5). The 32 sectors are equal in that integral, not in
 // angle as in the paper, so each bit weighs the same; a random shift of their borders makes the count of bits unbiased.
-// What lies between two neighbouring samples of one surface is covered by it: the paper leaves such gaps open.
+// A sample stands for its surface as far as half-way to the samples before and after it: the paper leaves gaps between.
 
 #include "engines/ssdo/screen_lib.glsl"
 
 const float SECTORS = 32.0;
-// Samples whose planes meet each other within this share of their distance are one surface (17°).
-const float SAME_SURFACE = 0.3;
 
 // ∫₀^θ cos(x − γ) |sin x| dx.
 float slice_integral(float theta, float gamma)
@@ -60,6 +58,8 @@ uint sectors_between(Slice slice, float a, float b)
 
 // Angle from v of a direction in the slice, on the side of T where `side` is 1.
 float slice_angle(vec3 d, vec3 v, float side) { return side * acos(clamp(dot(d, v) * inversesqrt(max(dot(d, d), 1e-37)), -1.0, 1.0)); }
+
+vec3 surface_ws(vec4 plane, ivec2 pixel, vec2 p) { return ws_from_screen(vec3(p, plane_near(plane, pixel, p))); }
 
 // Pixels from `from` to the picture's edge along a unit direction.
 float pixels_to_edge(vec2 from, vec2 along)

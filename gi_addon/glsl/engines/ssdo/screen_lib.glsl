@@ -40,5 +40,18 @@ float ray_length_on_screen(vec3 start_ws, vec3 direction_ws, float reach)
 // Where along its way, in [0, 1], a march tests for the k-th time: finer near its start, and the end itself at last.
 float spacing(int k, int steps, float jitter) { return sqr((float(k) + jitter) / (float(steps) - 1.0 + jitter)); }
 
-// The plane of the surface at pixel position `p`, q there.
-float plane_at(vec4 plane, vec2 p) { return plane.x + dot(plane.yz, p - (floor(p) + 0.5)); }
+// Whether the surface of `pixel` shows its front to a point at screen position `at`: the point is in front of its plane, by a
+// tenth of a pixel's width at least. Less is the rounding of normals, and would make planes light themselves.
+bool faces(vec4 plane, ivec2 pixel, vec3 at)
+{
+    float tenth = 0.1 * view.pixel_size * (view.orthographic > 0.5 ? 1.0 : at.z);
+    return at.z > plane.x + dot(plane.yz, at.xy - (vec2(pixel) + 0.5)) + tenth;
+}
+
+// The surface of `pixel` continued to pixel position `p`, q there. A plane that is looked along would run to the eye or the
+// horizon; it is followed to half and double its depth.
+float plane_near(vec4 plane, ivec2 pixel, vec2 p)
+{
+    float q = plane.x + dot(plane.yz, p - (vec2(pixel) + 0.5));
+    return view.orthographic > 0.5 ? q : clamp(q, 0.5 * plane.x, 2.0 * plane.x);
+}
