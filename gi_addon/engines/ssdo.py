@@ -8,6 +8,9 @@ depth buffer or over slices with a visibility bitmask. What lies outside the pic
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 from ..facts import Facts
 from ..frame import Frame
 from ..gpu_scene import world_source
@@ -18,6 +21,7 @@ from ..passes.direct_lighting import DirectLighting
 from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentTint, _screen, gather_size
 from ..passes.lights import LightList, ShadowMaps
 from ..passes.resolve import Resolve
+from ..passes.volumetric import Volumetric
 from ..settings import Settings
 
 
@@ -46,6 +50,10 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         IndirectLighting("gbuffer.emission", "screen.low", "screen.light"),
         DirectLighting(),
         *bounces,
+        ShadedScreen(),
+        NearnessPyramid(),
+        Reflections(),
+        Volumetric(),
         Resolve(layers),
     ]
 
@@ -86,7 +94,10 @@ class SentLight(Pass):
         self.title = f"SSDO Sent Light {bounce}"
         self.bounce = bounce
         before = (Optional(f"ssdo.bounce.{bounce - 1}"),) if bounce > 1 else ()
-        self.reads = ("direct.diffuse", "gbuffer.diffuse", *before)
+        self.reads = (
+            "direct.diffuse", "gbuffer.diffuse", Optional("gbuffer.specular"), Optional("gbuffer.lobe"),
+            Optional("brdf.average"), Optional("brdf.energy"), *before,
+        )  # fmt: skip
         self.writes = (
             Texture(f"ssdo.sent.{bounce}", "ssdo_sent", "radiance that leaves the surface, W/(m²·sr)", "rgba32f", _screen),
         )
@@ -135,24 +146,17 @@ class _Gather(Pass):
 
     def run(self, frame: Frame, planned: Planned) -> None:
         settings = planned.facts.settings.ssdo
-        units = len(planned.texture_reads())
-        world = bool(self.defines(planned.facts)["GATHER_WORLD"])
-        virtual = {"generated/world.glsl": world_source(frame.gpu.world, units) if world else "// no world\n"}
-        program = frame.program(planned, virtual=virtual)
-        if world:
-            frame.gpu.bind_world_params()
-            frame.gpu.bind_images(frame.gpu.world, units)
         per_direction = settings.steps * (1 if settings.integrator == "RAYS" else 2)
-        frame.set(
-            program,
-            ssdo_directions=max(1, settings.samples // per_direction),
-            ssdo_steps=settings.steps,
-            ssdo_radius=settings.radius,
-            ssdo_thickness=settings.thickness,
-        )
-        frame.screen(planned, program)
-        if world:
-            frame.gpu.unbind_images(units, len(frame.gpu.world.images))
+        with _world(frame, planned, bool(self.defines(planned.facts)["GATHER_WORLD"])) as virtual:
+            program = frame.program(planned, virtual=virtual)
+            frame.set(
+                program,
+                ssdo_directions=max(1, settings.samples // per_direction),
+                ssdo_steps=settings.steps,
+                ssdo_radius=settings.radius,
+                ssdo_thickness=settings.thickness,
+            )
+            frame.screen(planned, program)
 
 
 class InterpolatedIndirect(_Gather):
@@ -202,3 +206,104 @@ def _title(sent: str) -> str:
 
 def _read(sent: str) -> str | Optional:
     return sent if sent.startswith("ssdo.") else Optional(sent)
+
+
+def _no_gloss(facts: Facts) -> str | None:
+    if not facts.settings.use_glossy:
+        return "glossy reflections are switched off"
+    return None if facts.glossy else "no visible material is glossy"
+
+
+class ShadedScreen(Pass):
+    """What reflections and refractions see of each pixel."""
+
+    title = "SSDO Shaded Screen"
+    reads = (Optional("gbuffer.diffuse"), Optional("direct.diffuse"), Optional("indirect.diffuse"), Optional("direct.glossy"))
+    writes = (
+        Texture("ssdo.shaded", "ssdo_shaded", "radiance that leaves the surface, without its emission, W/(m²·sr)", "rgba32f",
+                _screen),
+    )  # fmt: skip
+    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/ssdo/shaded_frag.glsl"}}
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        frame.screen(planned, frame.program(planned))
+
+
+class NearnessPyramid(Pass):
+    """The nearest of 2 × 2, 4 × 4 … pixels."""
+
+    title = "SSDO Nearness Pyramid"
+    figure = "G-buffers Mipmap Generation"
+    reads = ("ssdo.planes",)
+    writes = (
+        Texture("ssdo.pyramid", "ssdo_pyramid", "nearness of the nearest surface below the texel", "r32f", _screen,
+                mips=lambda f: max(f.resolution).bit_length() - 1),
+    )  # fmt: skip
+    shaders = {"main": {"compute": "engines/ssdo/pyramid_comp.glsl"}}
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        pyramid = frame.resources["ssdo.pyramid"]
+        width, height = planned.facts.resolution
+        frame.bind(planned)
+        for level in range(max(width, height).bit_length()):
+            program = frame.program(planned, FIRST_LEVEL=int(level == 0))
+            if level:
+                pyramid.bind_to_image(0, read=True, write=False, level=level - 1)
+            pyramid.bind_to_image(min(level, 1), read=False, write=True, level=level)
+            program.run(-(-width // 8), -(-height // 8))
+            frame.gl.ctx.memory_barrier()
+            width, height = max(1, width // 2), max(1, height // 2)
+
+
+class Reflections(Pass):
+    """Glossy reflections of the screen."""
+
+    title = "SSDO Reflections"
+    reads = (
+        "ssdo.planes", "ssdo.pyramid", "ssdo.shaded", "gbuffer.depth", "gbuffer.normal", "gbuffer.specular", "gbuffer.lobe",
+        "brdf.energy", "brdf.average", Optional("gbuffer.emission", ("reflected.sources",)),
+    )  # fmt: skip
+    writes = (
+        Texture("indirect.glossy", "indirect_glossy", "radiance that the glossy lobe reflects of the screen, W/(m²·sr)",
+                "rgba32f", _screen),
+        Texture("reflected.sources", "reflected_sources", "radiance that it reflects of the world and of emissive pixels",
+                "rgba32f", _screen,
+                when=lambda f: None if _sources_traced(f) else "the world and emissive surfaces shine through shadow maps"),
+    )  # fmt: skip
+    uniforms = (
+        Uniform("ssdo_thickness", "float", "thickness of what the screen shows, as a share of its distance from the receiver"),
+    )
+    shaders = {"main": {"compute": "engines/ssdo/reflections_comp.glsl"}}
+
+    def absent(self, facts: Facts) -> str | None:
+        return _no_gloss(facts)
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return {
+            "TRACE_WORLD": int(facts.screen_sources and not facts.world_black),
+            "TRACE_EMISSION": int(facts.screen_sources and facts.emissive_light),
+        }
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        world = bool(self.defines(planned.facts)["TRACE_WORLD"])
+        with _world(frame, planned, world) as virtual:
+            program = frame.program(planned, virtual=virtual)
+            frame.set(program, ssdo_thickness=planned.facts.settings.ssdo.thickness)
+            frame.compute(planned, program, planned.facts.resolution)
+
+
+def _sources_traced(facts: Facts) -> bool:
+    return facts.screen_sources and (facts.emissive_light or not facts.world_black)
+
+
+@contextmanager
+def _world(frame: Frame, planned: Planned, wanted: bool) -> Iterator[dict[str, str]]:
+    """The world's shader for a program, and its images bound after the pass's own textures."""
+    units = len(planned.texture_reads())
+    if not wanted:
+        yield {"generated/world.glsl": "// no world\n"}
+        return
+    frame.gpu.bind_world_params()
+    frame.gpu.bind_images(frame.gpu.world, units)
+    yield {"generated/world.glsl": world_source(frame.gpu.world, units)}
+    frame.gpu.unbind_images(units, len(frame.gpu.world.images))

@@ -57,6 +57,9 @@ void main()
 #if HAS_DIRECT_GLOSSY
         glossy_direct = texelFetch(direct_glossy, pixel, 0).rgb;
 #endif
+#if HAS_REFLECTED_SOURCES
+        glossy_direct += texelFetch(reflected_sources, pixel, 0).rgb;
+#endif
 #if HAS_INDIRECT_GLOSSY
         glossy_indirect = texelFetch(indirect_glossy, pixel, 0).rgb;
 #endif
