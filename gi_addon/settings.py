@@ -174,6 +174,11 @@ class SSDOSettings:
         0.5, "Thickness", "How thick what the screen shows is taken to be, as a share of its distance from the receiver",
         low=0.01, high=10.0, higher="fewer leaks behind things", lower="light passes behind thin things",
     )  # fmt: skip
+    occlusion: str = _setting(
+        "BITMASK", "Ambient Occlusion", "How the Ambient Occlusion pass is made",
+        choices=(("BITMASK", "Visibility Bitmask", "Sectors of slices that samples fill"),
+                 ("MITTRING", "Mittring", "Points along directions, as the other techniques and the paper do")),
+    )  # fmt: skip
     margin: float = _setting(
         0.0, "Margin", "How much is drawn beyond each side of the picture, as a share of its longer side: what lies there "
         "still counts", low=0.0, high=1.0, higher="light from just outside", lower="faster",

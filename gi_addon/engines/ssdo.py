@@ -44,7 +44,7 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         TranslucentTint(),
         GBufferMips(),
         ScreenPlanes(),
-        AOGeneration(),
+        AOGeneration() if settings.ssdo.occlusion == "MITTRING" else AOScan(),
         AOBlur(),
         InterpolatedIndirect("gbuffer.emission", "screen.low"),
         IndirectLighting("gbuffer.emission", "screen.low", "screen.light"),
@@ -206,6 +206,39 @@ def _title(sent: str) -> str:
 
 def _read(sent: str) -> str | Optional:
     return sent if sent.startswith("ssdo.") else Optional(sent)
+
+
+class AOScan(Pass):
+    """Ambient occlusion from the visibility bitmask, in the place of Mittring's."""
+
+    title = "SSDO AO Generation"
+    figure = "SSAO Generation"
+    reads = ("ssdo.planes", "gbuffer.depth", "gbuffer.normal")
+    writes = (
+        Texture("ao.raw", "ao_raw", "cosine-weighted share of directions free of occluders within the AO distance, twice",
+                "rg16f", _screen, scratch=True),
+    )  # fmt: skip
+    uniforms = (
+        Uniform("ao_slices", "int", "slices per pixel"),
+        Uniform("ao_steps", "int", "depth tests along each of a slice's two sides"),
+        Uniform("ao_distance", "float", "how far an occluder counts, m"),
+        Uniform("ao_thickness", "float", "thickness of what the screen shows, as a share of its distance from the receiver"),
+    )
+    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/ssdo/ao_scan_frag.glsl"}}
+
+    def absent(self, facts: Facts) -> str | None:
+        return None if facts.settings.use_ao else "ambient occlusion is switched off"
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        facts, program = planned.facts, frame.program(planned)
+        frame.set(
+            program,
+            ao_slices=max(1, facts.settings.ao.samples // 2),
+            ao_steps=facts.settings.ao.steps,
+            ao_distance=min(facts.ao_distance, 2.0 * facts.radius),
+            ao_thickness=facts.settings.ssdo.thickness,
+        )
+        frame.screen(planned, program)
 
 
 def _no_gloss(facts: Facts) -> str | None:

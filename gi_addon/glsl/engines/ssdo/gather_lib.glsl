@@ -79,37 +79,20 @@ Gathered gather_screen(vec3 position_ws, vec3 n, vec3 ng, vec3 v, uint seed)
         Slice slice = make_slice(n, v, t, u.y);
         float horizon = atan(dot(ng, t), max(dot(ng, v), 1e-6));
         uint mask = ~sectors_between(slice, horizon - 0.5 * PI, horizon + 0.5 * PI);
-        vec4 ct = view.clip_from_world * vec4(t, 0.0);
-        vec2 along = (ct.xy * c.w - c.xy * ct.w) * view.resolution;
-        along *= inversesqrt(max(dot(along, along), 1e-37));
+        vec2 along = screen_direction(c, t);
         for (int k = 0; k < 2 * ssdo_steps; ++k) {
             bool turned = k >= ssdo_steps;
             float side = turned ? -1.0 : 1.0;
             int step_ = turned ? k - ssdo_steps : k;
             float jitter = fract(jitters.x + turn.y + 0.618034 * float(2 * i + int(turned)));
-            float edge = pixels_to_edge(origin.xy, along * side);
-            vec2 way = along * (side * edge);
-            float s = spacing(step_, ssdo_steps, jitter);
-            vec2 p = origin.xy + way * s;
-            ivec2 pixel = ivec2(p);
-            vec4 plane = texelFetch(ssdo_planes, pixel, 0);
-            vec3 d = ws_from_screen(vec3(p, plane_near(plane, pixel, p))) - position_ws;
-            float distance = length(d);
-            if (plane.x > 0.5 * NOTHING && distance > 0.0 && distance <= reach) {
-                // Its surface stands for the screen half-way to the samples before and after it.
-                float s_before = 0.5 * (s + (step_ > 0 ? spacing(step_ - 1, ssdo_steps, jitter) : 0.0));
-                float s_after = 0.5 * (s + (step_ + 1 < ssdo_steps ? spacing(step_ + 1, ssdo_steps, jitter) : 1.0));
-                float theta = slice_angle(d, v, side);
-                float before = slice_angle(surface_ws(plane, pixel, origin.xy + way * s_before) - position_ws, v, side);
-                float after = slice_angle(surface_ws(plane, pixel, origin.xy + way * s_after) - position_ws, v, side);
-                float behind = slice_angle(d - v * (ssdo_thickness * distance), v, side);
-                uint seen = sectors_between(slice, min(min(theta, behind), min(before, after)),
-                                            max(max(theta, behind), max(before, after))) & ~mask;
+            vec2 way = along * (side * pixels_to_edge(origin.xy, along * side));
+            SliceSample s = slice_sample(slice, origin, position_ws, v, way, side, step_, ssdo_steps, jitter, ssdo_thickness);
+            uint seen = s.sectors & ~mask;
+            if (seen != 0u && s.distance <= reach) {
                 mask |= seen;
-                if (seen != 0u && faces(plane, pixel, origin)) {
-                    vec3 direction = d / distance;
+                if (faces(s.plane, s.pixel, origin)) {
                     float share = float(bitCount(seen)) / SECTORS * slice.weight;
-                    add_light(g, sent_from(pixel) * share, direction, dot(direction, n));
+                    add_light(g, sent_from(s.pixel) * share, s.direction, dot(s.direction, n));
                 }
             }
         }
