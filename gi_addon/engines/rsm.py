@@ -15,7 +15,7 @@ from ..graph import Buffer, Optional, Pass, Planned, Texture, Uniform
 from ..passes.ao import AOBlur, AOGeneration
 from ..passes.brdf_tables import BRDFTables
 from ..passes.direct_lighting import DirectLighting
-from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentTint, _screen, gather_size
+from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint, _screen, gather_size
 from ..passes.lights import LightList, RSMGeneration, ShadowMaps
 from ..passes.occupancy import CELL_UNIFORMS, Occupancy, set_cells
 from ..passes.resolve import Resolve
@@ -34,13 +34,17 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         RSMSamplingPattern(),
         Occupancy(),
         GBuffer(),
+        TranslucentLayer(),
+        TranslucentBack(),
         TranslucentTint(),
         GBufferMips(),
         AOGeneration(),
         AOBlur(),
-        InterpolatedIndirect(),
-        IndirectLighting(),
+        InterpolatedIndirect(settings),
+        IndirectLighting(settings),
         DirectLighting(),
+        GlossyReflections(),
+        Refraction(),
         Volumetric(),
         Resolve(layers),
     ]
@@ -52,9 +56,10 @@ def _bounce_off(facts: Facts) -> str | None:
     return "bounces is 0" if facts.settings.bounces == 0 else None
 
 
-def _gather_defines(facts: Facts) -> dict[str, int]:
+def _gather_defines(facts: Facts, *, always: bool = False) -> dict[str, int]:
     lamps = any(s.kind == LIGHT_MESH for s in facts.rig.sources)
-    return {"GATHER_SCALE": facts.settings.gather_scale, "MESH_LIGHTS": int(lamps), **medium_defines(facts)}
+    untested = {"HAS_OCCUPANCY": 0} if facts.settings.rsm.visibility == "NONE" and not always else {}
+    return {"GATHER_SCALE": facts.settings.gather_scale, "MESH_LIGHTS": int(lamps), **medium_defines(facts), **untested}
 
 
 class RSMFlux(Pass):
@@ -145,12 +150,17 @@ class RSMSamplingPattern(Pass):
         frame.compute(planned, program, (count,), (64,))
 
 
+def _tested(reads: tuple, settings: Settings) -> tuple:
+    """``reads`` with the cells, where visibility is tested."""
+    return reads if settings.rsm.visibility == "NONE" else (Optional("occupancy"), *reads)
+
+
 class InterpolatedIndirect(Pass):
     """Indirect irradiance at one pixel per block."""
 
     title = "RSM Interpolated Indirect Lighting Computation"
     figure = "RSM Interpolated Indirect Lighting Computation"
-    reads = ("vpls", "rsm.lights", Optional("occupancy"), "gbuffer.low_depth", "gbuffer.low_normal", "gbuffer.low_pixel")
+    reads = ("vpls", "rsm.lights", "gbuffer.low_depth", "gbuffer.low_normal", "gbuffer.low_pixel")
     writes = (
         Texture("indirect.low", "low_indirect", "radiance a white Lambert surface would reflect, W/(m²·sr)", "rgba32f",
                 gather_size, scratch=True),
@@ -159,6 +169,9 @@ class InterpolatedIndirect(Pass):
     )  # fmt: skip
     uniforms = (Uniform("vpl_count", "int", "virtual point lights in the list"), *CELL_UNIFORMS, *MEDIUM_UNIFORMS)
     shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/rsm/gather_low_frag.glsl"}}
+
+    def __init__(self, settings: Settings) -> None:
+        self.reads = _tested(type(self).reads, settings)
 
     def defines(self, facts: Facts) -> dict[str, int]:
         return _gather_defines(facts)
@@ -180,7 +193,7 @@ class IndirectLighting(Pass):
     title = "RSM Lighting Computation"
     figure = "RSM Lighting Computation"
     reads = (
-        "vpls", "rsm.lights", Optional("occupancy"), "gbuffer.depth", "gbuffer.normal", Optional("gbuffer.low_depth"),
+        "vpls", "rsm.lights", "gbuffer.depth", "gbuffer.normal", Optional("gbuffer.low_depth"),
         Optional("gbuffer.low_normal"), Optional("gbuffer.low_pixel"), Optional("indirect.low"),
         Optional("indirect.low_direction"), Optional("ao"),
     )  # fmt: skip
@@ -191,6 +204,9 @@ class IndirectLighting(Pass):
     uniforms = (Uniform("vpl_count", "int", "virtual point lights in the list"), *CELL_UNIFORMS, *MEDIUM_UNIFORMS)
     shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/rsm/lighting_frag.glsl"}}
 
+    def __init__(self, settings: Settings) -> None:
+        self.reads = _tested(type(self).reads, settings)
+
     def defines(self, facts: Facts) -> dict[str, int]:
         return _gather_defines(facts)
 
@@ -199,4 +215,71 @@ class IndirectLighting(Pass):
         frame.set(program, vpl_count=planned.facts.settings.rsm.samples)
         set_cells(frame, program, planned.facts)
         set_medium(frame, program, planned.facts)
+        frame.screen(planned, program)
+
+
+_RAY_READS = (
+    "occupancy", "rsm.depth", "rsm.normal", "rsm.albedo", "rsm.lights", "rsm.views", "gbuffer.depth", "gbuffer.normal",
+    Optional("vpls"), Optional("gbuffer.emission", ("transmission.indirect",)), Optional("gbuffer.diffuse"), Optional("direct.diffuse"), Optional("indirect.diffuse"),
+)  # fmt: skip
+_RAY_UNIFORMS = (
+    *CELL_UNIFORMS,
+    *MEDIUM_UNIFORMS,
+    Uniform("rsm_light_count", "int", "lights with reflective shadow maps"),
+    Uniform("vpl_count", "int", "virtual point lights in the list"),
+)
+
+
+def _set_ray(frame: Frame, program, facts: Facts) -> None:
+    set_cells(frame, program, facts)
+    set_medium(frame, program, facts)
+    frame.set(program, rsm_light_count=len(facts.rig.sources), vpl_count=facts.settings.rsm.samples)
+
+
+class GlossyReflections(Pass):
+    """What glossy surfaces mirror of lit surfaces: a ray per pixel, cast in the RSMs."""
+
+    title = "RSM Glossy Reflections"
+    figure = "Ray Casting in RSM"
+    reads = (*_RAY_READS, "gbuffer.specular", "gbuffer.lobe", "brdf.energy", "brdf.average")
+    writes = (
+        Texture("indirect.glossy", "indirect_glossy", "radiance reflected by the glossy lobe, W/(m²·sr)", "rgba32f", _screen),
+    )  # fmt: skip
+    uniforms = _RAY_UNIFORMS
+    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/rsm/glossy_frag.glsl"}}
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return _gather_defines(facts, always=True)
+
+    def absent(self, facts: Facts) -> str | None:
+        return None if facts.settings.use_glossy else "glossy reflections are switched off"
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        program = frame.program(planned)
+        _set_ray(frame, program, planned.facts)
+        frame.screen(planned, program)
+
+
+class Refraction(Pass):
+    """What is seen through refracting surfaces: a refracted ray per pixel, cast in the RSMs, which hold no such surface."""
+
+    title = "RSM Translucency"
+    figure = "Ray Casting in RSM"
+    reads = (
+        *_RAY_READS, "gbuffer.transmission", "translucent.depth", "translucent.normal",
+        "translucent.color", "translucent.medium", "translucent.back_depth", "translucent.back_normal",
+    )  # fmt: skip
+    writes = (
+        Texture("transmission.indirect", "transmission_indirect", "radiance through refracting surfaces, tinted; alpha 1 "
+                "where the ray found something", "rgba32f", _screen),
+    )  # fmt: skip
+    uniforms = _RAY_UNIFORMS
+    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/rsm/refraction_frag.glsl"}}
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return _gather_defines(facts, always=True)
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        program = frame.program(planned)
+        _set_ray(frame, program, planned.facts)
         frame.screen(planned, program)
