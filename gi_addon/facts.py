@@ -87,7 +87,8 @@ def gather_facts(
         scene.lights, bounds,
         world=None if from_screen else world, world_samples=s.world.samples,
         emitters=Emitters.none() if from_screen else emitters, emitter_samples=_EMITTER_SAMPLES, area_lights=s.use_area_lights,
-        shadows=s.use_shadows, bounces=s.use_indirect_diffuse and s.bounces > 0 and s.technique != "SSDO",
+        shadows=s.use_shadows and not (s.technique == "SSDO" and s.ssdo.shadows == "SCREEN"),
+        bounces=s.use_indirect_diffuse and s.bounces > 0 and s.technique != "SSDO",
         shadow_resolution=s.shadows.resolution, bounce_resolution=s.rsm.resolution,
         world_resolution=s.world.resolution,
     )  # fmt: skip

@@ -179,6 +179,22 @@ class SSDOSettings:
         choices=(("BITMASK", "Visibility Bitmask", "Sectors of slices that samples fill"),
                  ("MITTRING", "Mittring", "Points along directions, as the other techniques and the paper do")),
     )  # fmt: skip
+    shadows: str = _setting(
+        "MAPS", "Shadows", "Where shadows come from",
+        choices=(("MAPS", "Shadow Maps", "What every light sees"),
+                 ("CONTACT", "Maps and Contacts", "Shadow maps, and short rays through the depth buffer over them"),
+                 ("SCREEN", "Screen", "Rays through the depth buffer alone: what is not in the picture throws no shadow")),
+    )  # fmt: skip
+    contact: float = _setting(
+        0.02, "Contact", "Length of the rays for contact shadows, as a share of the scene's radius", low=0.0, high=2.0,
+        higher="longer fine shadows", lower="only where things touch",
+    )  # fmt: skip
+    volumetric: str = _setting(
+        "MARCH", "Volumetric", "How light in the air is shadowed",
+        choices=(("MARCH", "Shadow Maps", "Points on each pixel's ray are looked up in the lights' maps"),
+                 ("RADIAL", "Radial Blur", "The share of the screen between a pixel and the light that does not hide it; the "
+                  "light must be in the picture")),
+    )  # fmt: skip
     margin: float = _setting(
         0.0, "Margin", "How much is drawn beyond each side of the picture, as a share of its longer side: what lies there "
         "still counts", low=0.0, high=1.0, higher="light from just outside", lower="faster",

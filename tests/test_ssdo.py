@@ -203,7 +203,7 @@ def test_slices_weigh_one_in_the_mean_and_their_sectors_tile(gl):
     tilts = np.repeat([0.0, 0.4, 0.9, 1.4], 512)
     phi = np.tile(np.pi * (np.arange(512) + 0.5) / 512, 4)
     x = np.c_[tilts, phi, rng.random(2048) * 0.99, rng.uniform(-1.5, 1.5, 2048)]
-    out = gl(evaluate, code, x, "engines/ssdo/scan_lib.glsl")
+    out = gl(evaluate, code, x, "engines/ssdo/slice_lib.glsl")
     for k in range(4):
         assert out[512 * k : 512 * (k + 1), 0].mean() == pytest.approx(1.0, abs=0.01)
     assert out[:, 1].max() == 0 and out[:, 2].min() == 32
@@ -299,7 +299,8 @@ def test_what_is_switched_off_does_not_run(gl):
 
 OTHER = {
     "ssdo.samples": 64, "ssdo.steps": 4, "ssdo.integrator": "RAYS", "ssdo.radius": 0.2, "ssdo.thickness": 0.02,
-    "ssdo.margin": 0.25, "ssdo.sources": "SCREEN",
+    "ssdo.margin": 0.25, "ssdo.sources": "SCREEN", "ssdo.occlusion": "MITTRING", "ssdo.shadows": "SCREEN",
+    "ssdo.contact": 0.5, "ssdo.volumetric": "RADIAL",
 }  # fmt: skip
 
 
@@ -307,5 +308,150 @@ OTHER = {
 def test_every_setting_of_the_technique_changes_the_picture(gl, path):
     scene = scenes.cornell()
     scene.world = scenes.world((0.3, 0.4, 0.5))
-    a, b = (ssdo(scene, samples=2, **s).passes["Combined"] for s in ({}, {path.replace(".", "__"): OTHER[path]}))
-    assert not np.array_equal(a, b)
+    on = {"volume__density": 0.05} if path == "ssdo.volumetric" else {"ssdo__shadows": "CONTACT"} if "contact" in path else {}
+    a, b = (
+        ssdo(scene, "Combined", "Ambient Occlusion", samples=2, resolution=(64, 36), **on, **s).passes
+        for s in ({}, {path.replace(".", "__"): OTHER[path]})
+    )
+    assert any(not np.array_equal(a[name], b[name]) for name in a)
+
+
+# --- effects ------------------------------------------------------------------------------------------------------------
+
+
+def mirror(roughness: float, **settings):
+    """A mirror floor before a wall of even brightness: (reflected radiance, the wall's own), at pixels that reflect it."""
+    b = scenes.SceneBuilder()
+    b.quads(FLOOR[None], scenes.principled(Metallic=1.0, Roughness=roughness, Base_Color=(1, 1, 1, 1)))
+    b.quads(np.array([[[-1, 1, 0], [1, 1, 0], [1, 1, 1], [-1, 1, 1]]]), scenes.diffuse((0.8,) * 3))
+    b.light(scenes.sun_light((0, 1, -1), 5.0))
+    scene = b.build(scenes.perspective((0, -3.2, 1.0), (0, 0.3, 0.4), 0.9))
+    p = ssdo(scene, "Glossy Indirect", "Glossy Color", "Normal", samples=4, use_indirect_diffuse=False, **settings).passes
+    lit = (p["Glossy Indirect"] * p["Glossy Color"])[..., 0]
+    height, width = lit.shape
+    inner = lit[height // 8 : height // 3, int(width * 0.4) : int(width * 0.6)]
+    return inner, 0.8 * 5.0 / np.sqrt(2.0) / np.pi
+
+
+def test_a_mirror_shows_the_wall_behind_it_as_bright_as_it_is(gl):
+    """What a perfect mirror reflects is the wall's own radiance, ρ E/π, at every pixel that reflects it."""
+    seen, wall = mirror(0.0)
+    assert seen == pytest.approx(np.full_like(seen, wall), rel=0.01)
+
+
+def test_a_rough_mirror_reflects_less_of_a_small_wall(gl):
+    """A wide lobe looks past the wall: dimmer, not darker than half; and off is off."""
+    seen, wall = mirror(0.35)
+    assert 0.4 * wall < seen.mean() < 0.95 * wall
+    seen, _ = mirror(0.0, use_glossy=False)
+    assert seen.max() == 0.0
+
+
+def test_the_world_is_in_the_mirror_where_rays_find_nothing(gl):
+    """With the world taken from the screen, a mirror under it shows its radiance: Glossy Direct, as in Cycles."""
+    b = scenes.SceneBuilder()
+    b.quads(FLOOR[None] * 3, scenes.principled(Metallic=1.0, Roughness=0.0, Base_Color=(1, 1, 1, 1)))
+    scene = b.build(scenes.perspective((0, -3, 2), (0, 0, 0), 0.8), scenes.world((0.5, 0.6, 0.7)))
+    p = ssdo(scene, "Glossy Direct", "Glossy Color", "Depth", samples=1, ssdo__sources="SCREEN").passes
+    seen = p["Depth"][..., 0] < 1e9
+    light = (p["Glossy Direct"] * p["Glossy Color"])[seen]
+    assert light.mean(axis=0) == pytest.approx(np.array([0.5, 0.6, 0.7]), rel=0.01)
+
+
+def occluder(**settings):
+    """A slab above a floor under a sun: Shadow (H, W) and the scene's settings."""
+    b = scenes.SceneBuilder()
+    b.quads(FLOOR[None], scenes.diffuse((0.8,) * 3))
+    b.quads(scenes.box_quads((-0.3, -0.3, 0.0), (0.3, 0.3, 0.5)), scenes.diffuse((0.8,) * 3))
+    b.light(scenes.sun_light((0.7, 0.3, -1), 5.0))
+    return ssdo(b.build(scenes.perspective((0, -3.2, 2.4), (0, 0, 0.2), 0.8)), "Diffuse Direct", samples=4, **settings)
+
+
+def test_screen_rays_throw_the_shadow_that_the_map_throws(gl):
+    """An occluder wholly on the screen: the two agree but for its rim and the side that the camera does not see."""
+    by_map, by_rays = (occluder(ssdo__shadows=s).passes["Diffuse Direct"][..., 0] for s in ("MAPS", "SCREEN"))
+    dark = by_map < 0.1 * by_map.max()
+    agree = (by_rays < 0.5 * by_map.max()) == (by_map < 0.5 * by_map.max())
+    assert dark.sum() > 50 and agree.mean() > 0.95
+
+
+def test_screen_shadows_need_no_shadow_map_and_contacts_only_darken(gl):
+    assert "Shadow Maps" not in [p.title for p in occluder(ssdo__shadows="SCREEN").plan.run]
+    maps, contacts = (occluder(ssdo__shadows=s).passes["Diffuse Direct"] for s in ("MAPS", "CONTACT"))
+    assert (contacts <= maps + 1e-6).all() and contacts.sum() < maps.sum()
+    assert contacts.mean() > 0.9 * maps.mean()
+
+
+def glass(ior: float, **settings):
+    """A pane of glass before a wall whose right half is dark."""
+    b = scenes.SceneBuilder()
+    for x0, x1, color in ((-3, 0, 0.8), (0, 3, 0.0)):
+        b.quads(np.array([[[x0, 1, -2], [x1, 1, -2], [x1, 1, 2], [x0, 1, 2]]]), scenes.diffuse((color,) * 3))
+    b.quads(scenes.box_quads((-1, -0.5, -0.6), (1, 0.0, 0.6)),
+            scenes.principled(Transmission_Weight=1.0, Roughness=0.0, IOR=ior, Base_Color=(1, 1, 1, 1)))  # fmt: skip
+    b.light(scenes.sun_light((0, 1, -0.2), 5.0))
+    scene = b.build(scenes.perspective((-1.2, -3.5, 0), (-0.1, 0, 0), 0.55))
+    return ssdo(scene, "Transmission Indirect", "Transmission Color", samples=1, use_indirect_diffuse=False, resolution=(160, 90),
+                **settings).passes  # fmt: skip
+
+
+def test_a_pane_moves_what_is_behind_it_by_snells_law(gl):
+    """A plane-parallel pane of depth D shifts the ray sideways by D (tan θ − tan θ'), sin θ = n sin θ': so the wall's edge
+    moves by that much of a pixel count in the picture; with n = 1 not at all."""
+    def edge(ior):
+        p = glass(ior)
+        row = (p["Transmission Indirect"] * p["Transmission Color"])[45, :, 0]
+        lit = np.flatnonzero(row > 0.5 * row.max())
+        return lit.max()
+
+    eye, wall = np.array([-1.2, -3.5]), np.array([0.0, 1.0])
+    # The ray that reaches the edge enters the pane's face at y = −0.5; n = 1.5.
+    tan = (wall[0] - eye[0]) / (wall[1] - eye[1])
+    for _ in range(50):
+        sin = tan / np.hypot(1.0, tan) / 1.5
+        tan = (wall[0] - eye[0] - 0.5 * sin / np.sqrt(1 - sin * sin)) / (wall[1] - eye[1] - 0.5)
+    forward = np.arctan2(1.1, 3.5)
+    to_pixel = 160 / (2 * np.tan(0.275))
+    moved = (np.tan(np.arctan(tan) - forward) - np.tan(np.arctan(1.2 / 4.5) - forward)) * to_pixel
+    assert edge(1.5) - edge(1.0001) == pytest.approx(moved, abs=1.6)
+    assert abs(moved) > 2
+
+
+def test_light_below_the_surface_crosses_a_shadows_edge_and_keeps_its_sum(gl):
+    """A half-lit wall that scatters over 0.1 m: light where the shadow is, and as much missing before it."""
+    def wall(weight):
+        b = scenes.SceneBuilder()
+        b.quads(np.array([[[-2, 1, -2], [2, 1, -2], [2, 1, 2], [-2, 1, 2]]]),
+                scenes.principled(Base_Color=(0.8, 0.8, 0.8, 1), Subsurface_Weight=weight, Subsurface_Scale=0.1,
+                                  Subsurface_Radius=(1.0, 1.0, 1.0)))  # fmt: skip
+        b.quads(np.array([[[0, -3, -2], [3, -3, -2], [3, -3, 2], [0, -3, 2]]]), scenes.diffuse((0.5,) * 3), visibility=32)
+        b.light(scenes.sun_light((0, 1, 0), 5.0))
+        scene = b.build(scenes.perspective((0, -2.5, 0), (0, 0, 0), 0.5))
+        return ssdo(scene, "Diffuse Direct", samples=8, use_indirect_diffuse=False).passes["Diffuse Direct"][..., 0]
+
+    hard, soft = wall(0.0), wall(1.0)
+    middle = hard.shape[1] // 2
+    dark = slice(middle + 2, middle + 6)
+    assert hard[:, dark].max() < 0.05 * hard.max()
+    assert soft[:, dark].mean() > 0.1 * hard.max()
+    assert soft.mean() == pytest.approx(hard.mean(), rel=0.03)
+
+
+def test_radial_blur_shows_beams_of_a_light_in_the_picture_and_says_when_it_is_not(gl):
+    b = scenes.SceneBuilder()
+    b.quads(np.array([[[-3, 2, -2], [3, 2, -2], [3, 2, 2], [-3, 2, 2]]]), scenes.diffuse((0.1,) * 3))
+    b.quads(scenes.box_quads((0.5, -0.3, -0.3), (0.9, 0.1, 0.3)), scenes.diffuse((0.1,) * 3))
+    b.light(scenes.point_light((0, 0.5, 0), 50.0))
+    scene = b.build(scenes.perspective((0, -4, 0), (0, 0, 0), 0.8))
+    radial, march = (
+        ssdo(scene, "Volume Direct", samples=4, volume__density=0.1, ssdo__volumetric=v) for v in ("RADIAL", "MARCH")
+    )
+    a, c = radial.passes["Volume Direct"][..., 0], march.passes["Volume Direct"][..., 0]
+    # Left of the lamp nothing is in the way: the same light. Right of the box, its shadow.
+    assert a[:, :40].mean() == pytest.approx(c[:, :40].mean(), rel=0.05)
+    assert a[27, 80:].mean() < 0.6 * a[27, :16].mean()
+    assert not [n for n in radial.notes if "radial blur" in n]
+    scene.lights = [scenes.point_light((0, -6, 0), 50.0)]
+    result = ssdo(scene, "Volume Direct", samples=1, volume__density=0.1, ssdo__volumetric="RADIAL")
+    assert [n for n in result.notes if "outside the picture" in n]
+    assert result.passes["Volume Direct"].max() == 0.0

@@ -11,14 +11,17 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+import numpy as np
+
 from ..facts import Facts
 from ..frame import Frame
 from ..gpu_scene import world_source
+from ..gpu_types import LIGHT_SUN, LIGHT_WORLD
 from ..graph import Optional, Pass, Planned, Texture, Uniform
 from ..passes.ao import AOBlur, AOGeneration
 from ..passes.brdf_tables import BRDFTables
 from ..passes.direct_lighting import DirectLighting
-from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentTint, _screen, gather_size
+from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint, _screen, gather_size
 from ..passes.lights import LightList, ShadowMaps
 from ..passes.resolve import Resolve
 from ..passes.volumetric import Volumetric
@@ -48,12 +51,16 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         AOBlur(),
         InterpolatedIndirect("gbuffer.emission", "screen.low"),
         IndirectLighting("gbuffer.emission", "screen.low", "screen.light"),
-        DirectLighting(),
+        DirectLighting() if settings.ssdo.shadows == "MAPS" or not settings.use_shadows else ScreenShadowLighting(),
         *bounces,
         ShadedScreen(),
         NearnessPyramid(),
         Reflections(),
-        Volumetric(),
+        TranslucentLayer(),
+        TranslucentBack(),
+        Refraction(),
+        Subsurface(),
+        Volumetric() if settings.ssdo.volumetric == "MARCH" else RadialBlur(),
         Resolve(layers),
     ]
 
@@ -251,7 +258,9 @@ class ShadedScreen(Pass):
     """What reflections and refractions see of each pixel."""
 
     title = "SSDO Shaded Screen"
-    reads = (Optional("gbuffer.diffuse"), Optional("direct.diffuse"), Optional("indirect.diffuse"), Optional("direct.glossy"))
+    reads = (
+        Optional("gbuffer.diffuse"), Optional("direct.diffuse"), Optional("indirect.diffuse"), Optional("direct.glossy"),
+    )  # fmt: skip
     writes = (
         Texture("ssdo.shaded", "ssdo_shaded", "radiance that leaves the surface, without its emission, W/(m²·sr)", "rgba32f",
                 _screen),
@@ -340,3 +349,103 @@ def _world(frame: Frame, planned: Planned, wanted: bool) -> Iterator[dict[str, s
     frame.gpu.bind_images(frame.gpu.world, units)
     yield {"generated/world.glsl": world_source(frame.gpu.world, units)}
     frame.gpu.unbind_images(units, len(frame.gpu.world.images))
+
+
+class ScreenShadowLighting(DirectLighting):
+    """Direct light with shadows by screen-space rays: short ones over the shadow maps, or whole ones in their place."""
+
+    reads = (*DirectLighting.reads, "ssdo.planes")
+    uniforms = (
+        *DirectLighting.uniforms,
+        Uniform("ssdo_shadow_reach", "float", "length of the rays, world units"),
+        Uniform("ssdo_shadow_steps", "int", "depth tests along each"),
+        Uniform("ssdo_thickness", "float", "thickness of what the screen shows, as a share of its distance from the receiver"),
+    )
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return {**super().defines(facts), "HAS_SSDO_PLANES": 1}
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        facts = planned.facts
+        settings = facts.settings.ssdo
+        frame.set(
+            frame.program(planned),
+            ssdo_shadow_reach=(settings.contact if settings.shadows == "CONTACT" else 2.0) * facts.radius,
+            ssdo_shadow_steps=settings.steps,
+            ssdo_thickness=settings.thickness,
+        )
+        super().run(frame, planned)
+
+
+class Refraction(Pass):
+    """What is seen through refracting surfaces: a refracted ray per pixel, traced through the opaque G-buffer."""
+
+    title = "SSDO Refraction"
+    figure = "Lighting Computation"
+    reads = (
+        "ssdo.planes", "ssdo.pyramid", "ssdo.shaded", "gbuffer.transmission", "translucent.depth", "translucent.normal",
+        "translucent.color", "translucent.medium", "translucent.back_depth", "translucent.back_normal",
+        Optional("gbuffer.emission"),
+    )  # fmt: skip
+    writes = (
+        Texture("transmission.indirect", "transmission_indirect", "radiance through refracting surfaces, tinted; alpha 1 "
+                "where the ray found something", "rgba32f", _screen),
+    )  # fmt: skip
+    uniforms = Reflections.uniforms
+    shaders = {"main": {"compute": "engines/ssdo/refraction_comp.glsl"}}
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        program = frame.program(planned)
+        frame.set(program, ssdo_thickness=planned.facts.settings.ssdo.thickness)
+        frame.compute(planned, program, planned.facts.resolution)
+
+
+class Subsurface(Pass):
+    """Light that entered the surface near by."""
+
+    title = "SSDO Subsurface Scattering"
+    reads = (
+        "gbuffer.subsurface", "gbuffer.depth", "gbuffer.normal", "gbuffer.diffuse",
+        Optional("direct.diffuse", ("subsurface.direct",)), Optional("indirect.diffuse", ("subsurface.indirect",)),
+    )  # fmt: skip
+    writes = (
+        Texture("subsurface.direct", "subsurface_direct", "direct.diffuse after scattering below the surface; its share of "
+                "the surface's colour", "rgba32f", _screen),
+        Texture("subsurface.indirect", "subsurface_indirect", "the same of indirect.diffuse", "rgba32f", _screen),
+    )  # fmt: skip
+    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/ssdo/subsurface_frag.glsl"}}
+
+    def absent(self, facts: Facts) -> str | None:
+        return None if facts.settings.use_translucency else "translucency is switched off"
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        frame.screen(planned, frame.program(planned))
+
+
+class RadialBlur(Volumetric):
+    """The paper's cheap volumetric light: lights are visible from a pixel's air as far as the way to them on the screen is."""
+
+    title = "SSDO Volumetric Light by Radial Blur"
+    reads = (Optional("lights", ("volume.light",)), Optional("gbuffer.depth"))
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        # Without the camera's surfaces there is nothing in the way.
+        return {"RADIAL_BLUR": int(facts.visible), "HAS_LIGHT_VIEWS": 0, "HAS_SHADOW_DEPTH": 0, "HAS_RSM_DEPTH": 0}
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        if frame.subframe == 0:
+            notes = planned.facts.rig.notes
+            notes += [n for n in self.unseen(frame, planned.facts) if n not in notes]
+        super().run(frame, planned)
+
+    @staticmethod
+    def unseen(frame: Frame, facts: Facts) -> list[str]:
+        """A message for each lamp that is not in the picture, and so scatters no light here."""
+        out = []
+        clip_from_world = frame.view["clip_from_world"].T.astype("f8")
+        for light in frame.light_sample(bounce=False).lights:
+            parallel = light["kind"] in (LIGHT_SUN, LIGHT_WORLD)
+            x, y, _, w = clip_from_world @ np.append(-light["axis_ws"] if parallel else light["position_ws"], not parallel)
+            if w <= 0.0 or max(abs(x), abs(y)) > w:
+                out.append("a light is outside the picture: radial blur shows no beams of it; ssdo.volumetric MARCH does")
+        return out[:1]

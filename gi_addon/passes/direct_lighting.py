@@ -37,7 +37,7 @@ class DirectLighting(Pass):
     shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "passes/direct_lighting_frag.glsl"}}
 
     def defines(self, facts: Facts) -> dict[str, int]:
-        return medium_defines(facts)
+        return {**medium_defines(facts), "HAS_SSDO_PLANES": 0}
 
     def absent(self, facts: Facts) -> str | None:
         return None if facts.lit else "no light shines"

@@ -12,6 +12,10 @@
 #include "lib/medium_lib.glsl"
 #endif
 
+#if HAS_SSDO_PLANES
+#include "engines/ssdo/shadow_lib.glsl"
+#endif
+
 // GGX alpha after convolution with a uniform disc of angular radius θ: the half vector turns half as far as the light,
 // whose variance per axis is θ²/4, so slopes gain θ²/16; α² is twice the slopes' variance (Beckmann's relation).
 float widened_alpha(float alpha, float angle) { return min(sqrt(alpha * alpha + angle * angle / 8.0), 1.0); }
@@ -71,6 +75,11 @@ void main()
             }
 #if HAS_MEDIUM
             arriving *= medium_transmittance(position_ws, l, light_is_directional(light) ? 1e30 : length(light.position_ws - position_ws));
+#endif
+#if HAS_SSDO_PLANES
+            if (visible > 0.0) {
+                visible *= screen_visibility(light, receiver_ws, l, fract(turn * 0.159154943 + 0.618034 * float(i))); // 1/2π
+            }
 #endif
             vec3 irradiance = arriving * cos_l;
             open_light += irradiance;

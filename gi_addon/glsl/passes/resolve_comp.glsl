@@ -49,10 +49,20 @@ void main()
         diffuse_color = texelFetch(gbuf_diffuse, pixel, 0).rgb;
 #endif
 #if HAS_DIRECT_DIFFUSE
-        diffuse_direct = texelFetch(direct_diffuse, pixel, 0).rgb * diffuse_color;
+        diffuse_direct = texelFetch(direct_diffuse, pixel, 0).rgb;
+#if HAS_SUBSURFACE_DIRECT
+        vec4 below_direct = texelFetch(subsurface_direct, pixel, 0);
+        diffuse_direct = mix(diffuse_direct, below_direct.rgb, below_direct.a);
+#endif
+        diffuse_direct *= diffuse_color;
 #endif
 #if HAS_INDIRECT_DIFFUSE
-        diffuse_indirect = texelFetch(indirect_diffuse, pixel, 0).rgb * diffuse_color;
+        diffuse_indirect = texelFetch(indirect_diffuse, pixel, 0).rgb;
+#if HAS_SUBSURFACE_INDIRECT
+        vec4 below_indirect = texelFetch(subsurface_indirect, pixel, 0);
+        diffuse_indirect = mix(diffuse_indirect, below_indirect.rgb, below_indirect.a);
+#endif
+        diffuse_indirect *= diffuse_color;
 #endif
 #if HAS_DIRECT_GLOSSY
         glossy_direct = texelFetch(direct_glossy, pixel, 0).rgb;
