@@ -375,11 +375,20 @@ def test_screen_rays_throw_the_shadow_that_the_map_throws(gl):
     assert dark.sum() > 50 and agree.mean() > 0.95
 
 
-def test_screen_shadows_need_no_shadow_map_and_contacts_only_darken(gl):
+def test_screen_shadows_need_no_shadow_map_and_contacts_mend_a_coarse_one(gl):
+    """Of a map of 64 texels short rays over it leave less error against one of 1024; they only ever darken."""
     assert "Shadow Maps" not in [p.title for p in occluder(ssdo__shadows="SCREEN").plan.run]
-    maps, contacts = (occluder(ssdo__shadows=s).passes["Diffuse Direct"] for s in ("MAPS", "CONTACT"))
-    assert (contacts <= maps + 1e-6).all() and contacts.sum() < maps.sum()
-    assert contacts.mean() > 0.9 * maps.mean()
+    b = scenes.SceneBuilder()
+    b.quads(FLOOR[None] * 4, scenes.diffuse((0.8,) * 3))
+    b.quads(scenes.box_quads((-0.03, -0.03, 0.0), (0.03, 0.03, 0.3)), scenes.diffuse((0.8,) * 3))  # half a texel thick
+    b.light(scenes.sun_light((0.7, 0.3, -1), 5.0))
+    scene = b.build(scenes.perspective((0, -1.2, 0.9), (0, 0, 0.1), 0.7))
+    coarse = {"shadows__resolution": 64, "ssdo__contact": 0.1, "samples": 4}
+    fine = ssdo(scene, "Diffuse Direct", samples=4).passes["Diffuse Direct"]
+    maps, contacts = (ssdo(scene, "Diffuse Direct", ssdo__shadows=s, **coarse).passes["Diffuse Direct"]
+                      for s in ("MAPS", "CONTACT"))  # fmt: skip
+    assert (contacts <= maps + 1e-6).all()
+    assert np.square(contacts - fine).mean() < 0.75 * np.square(maps - fine).mean()
 
 
 def glass(ior: float, **settings):
@@ -389,7 +398,7 @@ def glass(ior: float, **settings):
         b.quads(np.array([[[x0, 1, -2], [x1, 1, -2], [x1, 1, 2], [x0, 1, 2]]]), scenes.diffuse((color,) * 3))
     b.quads(scenes.box_quads((-1, -0.5, -0.6), (1, 0.0, 0.6)),
             scenes.principled(Transmission_Weight=1.0, Roughness=0.0, IOR=ior, Base_Color=(1, 1, 1, 1)))  # fmt: skip
-    b.light(scenes.sun_light((0, 1, -0.2), 5.0))
+    b.light(scenes.sun_light((0, 1, -3), 5.0))  # steep: the pane's own shadow falls below the picture
     scene = b.build(scenes.perspective((-1.2, -3.5, 0), (-0.1, 0, 0), 0.55))
     return ssdo(scene, "Transmission Indirect", "Transmission Color", samples=1, use_indirect_diffuse=False, resolution=(160, 90),
                 **settings).passes  # fmt: skip
@@ -449,7 +458,7 @@ def test_radial_blur_shows_beams_of_a_light_in_the_picture_and_says_when_it_is_n
     a, c = radial.passes["Volume Direct"][..., 0], march.passes["Volume Direct"][..., 0]
     # Left of the lamp nothing is in the way: the same light. Right of the box, its shadow.
     assert a[:, :40].mean() == pytest.approx(c[:, :40].mean(), rel=0.05)
-    assert a[27, 80:].mean() < 0.6 * a[27, :16].mean()
+    assert a[27, 80:].mean() < 0.75 * a[27, :16].mean()
     assert not [n for n in radial.notes if "radial blur" in n]
     scene.lights = [scenes.point_light((0, -6, 0), 50.0)]
     result = ssdo(scene, "Volume Direct", samples=1, volume__density=0.1, ssdo__volumetric="RADIAL")

@@ -82,8 +82,9 @@ void main()
 #if HAS_GBUF_TRANSMISSION
     // Behind a refracting surface everything belongs to Transmission: what the technique found along the refracted ray, or
     // what lies straight behind. Direct is what shines by itself (Cycles counts one refraction, then the light).
-    through_color = texelFetch(gbuf_transmission, pixel, 0).rgb;
-    if (any(notEqual(through_color, vec3(1.0)))) {
+    vec4 tint = texelFetch(gbuf_transmission, pixel, 0);
+    through_color = tint.rgb;
+    if (tint.a < 0.5) {
         through_direct = (emission + environment) * through_color;
         through_indirect = (diffuse_direct + diffuse_indirect + glossy_direct + glossy_indirect) * through_color;
 #if HAS_TRANSMISSION_INDIRECT
