@@ -105,7 +105,9 @@ class Frame:
     ) -> None:
         self.gl, self.pool, self.gpu = gl, pool, gpu
         self.settings, self.facts, self.resources, self.timers = settings, facts, resources, timers
-        self.camera, self.region, self.full = camera, region, full
+        self.camera, self.full = camera, full
+        margin = facts.margin
+        self.region = (region[0] - margin, region[1] - margin, region[2] + 2 * margin, region[3] + 2 * margin)
         self.subframe = 0
         self._view_buffer = view_buffer
         self._screen_vao = screen_vao
@@ -122,6 +124,7 @@ class Frame:
         jitter = pixel_jitter(self.settings, subframe, self.facts.subframes)
         camera = lens_camera(self.camera, subframe, self.facts.subframes)
         self.view = view_uniforms(camera, self.region, self.full, jitter, subframe, self.facts)
+        self.view["margin"] = self.facts.margin
         self.view["film_transparent"] = float(self.film_transparent)
         self._view_buffer.write(self.view.tobytes())
         self._view_buffer.bind_to_uniform_block(0)
@@ -268,7 +271,8 @@ def view_uniforms(
     subframe: int,
     facts: Facts,
 ) -> np.ndarray:
-    """VIEW of a sub-frame. ``region`` (x, y, width, height) in pixels of the ``full`` picture, row 0 at the bottom."""
+    """VIEW of a sub-frame. ``region`` (x, y, width, height) in pixels of the ``full`` picture, row 0 at the bottom; it may
+    reach beyond it."""
     view = np.zeros((), VIEW)
     x, y, width, height = region
     projection = np.asarray(camera.clip_from_view, "f8").copy()

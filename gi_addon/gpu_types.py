@@ -20,6 +20,7 @@ VIEW = struct(
     ("forward_ws", "f4", 3), ("film_transparent", "f4"),
     ("resolution", "f4", 2), ("inverse_resolution", "f4", 2),
     ("pixel_offset", "i4", 2), ("subframe", "u4"), ("subframes", "u4"),
+    ("margin", "i4"), ("_pad0", "u4"), ("_pad1", "u4"), ("_pad2", "u4"),  # px drawn around the picture, within resolution
 )  # fmt: skip
 
 # One point of a light, good for one sub-frame. `kind` is one of the LIGHT_ constants; `emission` is irradiance (W/m²)

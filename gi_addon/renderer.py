@@ -189,7 +189,7 @@ class Renderer:
     def film(self) -> dict[str, np.ndarray]:
         """The film's layers so far, averaged: name -> (H, W, 4) f4."""
         texture = self.frame.resources["film"]
-        width, height = self.frame.facts.resolution
+        width, height = self.frame.facts.picture
         layers = self.frame.facts.layers
         data = np.frombuffer(texture.read(), np.float32).reshape(len(layers), height, width, 4)
         count = self.frame.subframe + 1
