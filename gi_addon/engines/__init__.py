@@ -7,10 +7,11 @@ from collections.abc import Callable
 
 from ..graph import Pass
 from ..settings import Settings
-from . import rsm, vct
+from . import rsm, ssdo, vct
 
 # Technique -> its passes in execution order, for the settings and the film layers wanted.
 TECHNIQUES: dict[str, Callable[[Settings, tuple[str, ...]], list[Pass]]] = {
     "RSM": rsm.passes,
     "VCT": vct.passes,
+    "SSDO": ssdo.passes,
 }

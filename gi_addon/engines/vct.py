@@ -13,11 +13,15 @@ from ..frame import Frame
 from ..graph import Optional, Pass, Planned, Texture, Uniform
 from ..passes.brdf_tables import BRDFTables
 from ..passes.direct_lighting import DirectLighting
-from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentTint, _screen, gather_size
+from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint, _screen, gather_size
 from ..passes.lights import LightList, RSMGeneration, ShadowMaps
+from ..passes.occupancy import Occupancy
 from ..passes.resolve import Resolve
+from ..passes.volumetric import MEDIUM_UNIFORMS, Volumetric, medium_defines, set_medium
 from ..passes.voxels import GRID_UNIFORMS, VoxelGrid, Voxelisation, voxel_grid
+from ..passes.world_guide import WorldGuide
 from ..settings import Settings
+from .rsm import Subsurface
 
 _FULLSCREEN = "passes/fullscreen_vert.glsl"
 
@@ -26,6 +30,8 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
     """Figure 4c, in order."""
     return [
         BRDFTables(),
+        Occupancy(),
+        WorldGuide(),
         LightList(),
         *([] if settings.vct.shadow_cones else [ShadowMaps()]),
         RSMGeneration(),
@@ -33,14 +39,19 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         VoxelCoverage(),
         RadianceInjection(),
         GBuffer(),
+        TranslucentLayer(),
+        TranslucentBack(),
         TranslucentTint(),
         GBufferMips(),
         VoxelAO(),
         InterpolatedIndirect(),
         IndirectLighting(),
         GlossyCones(),
-        *([ShadowCones()] if settings.vct.shadow_cones and settings.use_shadows else []),
+        *([ShadowCones()] if settings.vct.shadow_cones else []),
+        Subsurface(),
         DirectLighting(),
+        RefractionCones(),
+        VoxelVolumetric(),
         Resolve(layers),
     ]
 
@@ -146,6 +157,7 @@ class RadianceInjection(Pass):
         Uniform("view_count", "int", "reflective shadow maps in the list"),
         Uniform("first_time", "int", "1 when empty cells are due too"),
         Uniform("add_bounce", "int", "1 when later bounces are known"),
+        *MEDIUM_UNIFORMS,
     )
     shaders = {
         "main": {"compute": "engines/vct/inject_comp.glsl"},
@@ -157,6 +169,9 @@ class RadianceInjection(Pass):
 
     def rate(self, facts: Facts) -> str:
         return RSMGeneration().rate(facts) if facts.rig.bounce.sizes else "static"
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return medium_defines(facts)
 
     def run(self, frame: Frame, planned: Planned) -> None:
         grid = voxel_grid(planned.facts)
@@ -172,6 +187,7 @@ class RadianceInjection(Pass):
                 frame.resources["vct.bounce"].use(12)
                 frame.resources["vct.bounce_back"].use(13)
             frame.set(program, add_bounce=int(k > 0), **values)
+            set_medium(frame, program, planned.facts)
             frame.compute(planned, program, grid.size, (4, 4, 4))
             build_mips(frame, planned, grid)
 
@@ -346,3 +362,49 @@ class ShadowCones(Pass):
         _set_cones(frame, program, planned.facts)
         frame.set(program, light_count=len(planned.facts.rig.sources))
         frame.compute(planned, program, planned.facts.resolution)
+
+
+class RefractionCones(Pass):
+    """What is seen through refracting and translucent surfaces, by cones."""
+
+    title = "Voxel Translucency"
+    figure = "Voxel Lighting Computation"
+    reads = (
+        *_VOLUMES, "gbuffer.transmission", "translucent.depth", "translucent.normal", "translucent.color",
+        "translucent.medium", "translucent.back_depth", "translucent.back_normal",
+    )  # fmt: skip
+    writes = (
+        Texture("transmission.indirect", "transmission_indirect", "radiance through refracting surfaces, tinted; alpha 1 "
+                "where the cone met something", "rgba32f", _screen),
+    )  # fmt: skip
+    uniforms = _CONE_UNIFORMS
+    shaders = {"main": {"vertex": _FULLSCREEN, "fragment": "engines/vct/refraction_frag.glsl"}}
+
+    def absent(self, facts: Facts) -> str | None:
+        return _bounce_off(facts)
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        program = frame.program(planned)
+        _set_cones(frame, program, planned.facts)
+        frame.screen(planned, program)
+
+
+class VoxelVolumetric(Volumetric):
+    """Light in the air, blocked by voxels."""
+
+    title = "Voxel Volumetric Light"
+    reads = (
+        Optional("lights", ("volume.light",)), Optional("gbuffer.depth"), *(Optional(v, ("volume.light",)) for v in _VOLUMES),
+    )  # fmt: skip
+    uniforms = (*Volumetric.uniforms, *_CONE_UNIFORMS)
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        # Without shadows nothing blocks.
+        return {
+            "RADIAL_BLUR": 0, "VOXEL_VISIBILITY": int(facts.settings.use_shadows and facts.triangles > 0),
+            "HAS_LIGHT_VIEWS": 0, "HAS_SHADOW_DEPTH": 0, "HAS_RSM_DEPTH": 0,
+        }  # fmt: skip
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        _set_cones(frame, frame.program(planned), planned.facts)
+        super().run(frame, planned)
