@@ -65,17 +65,20 @@ def gather_facts(
     """Look at everything once."""
     bounds = scene.bounds()
     s = settings
+    seen = scene.instances.visibility & CAMERA if len(scene.instances) else np.zeros(0, "u4")
+    used = {m for i, ms in enumerate(scene.instances.materials) if seen[i] for m in ms}
+    some = [compiled[m] for m in used]
+    # Whatever looks at lit surfaces looks at the lights' bounce maps.
+    bounced = s.use_indirect_diffuse or (s.use_glossy and any(c.glossy for c in some))
+    bounced = bounced or (s.use_translucency and any(c.transmissive or c.subsurface for c in some))
     rig = build_rig(
         scene.lights, bounds,
         world=world, world_samples=s.world.samples,
         emitters=emitters, emitter_samples=_EMITTER_SAMPLES, area_lights=s.use_area_lights,
-        shadows=s.use_shadows, bounces=s.use_indirect_diffuse and s.bounces > 0,
+        shadows=s.use_shadows, bounces=s.bounces > 0 and bounced,
         shadow_resolution=s.shadows.resolution, bounce_resolution=s.rsm.resolution,
         world_resolution=s.world.resolution,
     )  # fmt: skip
-    seen = scene.instances.visibility & CAMERA if len(scene.instances) else np.zeros(0, "u4")
-    used = {m for i, ms in enumerate(scene.instances.materials) if seen[i] for m in ms}
-    some = [compiled[m] for m in used]
     return Facts(
         settings=s,
         resolution=resolution,
