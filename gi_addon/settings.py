@@ -52,7 +52,10 @@ def _group(cls: type) -> Any:
     return field(default_factory=cls)
 
 
-TECHNIQUES = (("RSM", "Reflective Shadow Maps", "One bounce gathered from virtual point lights on what the lights see"),)
+TECHNIQUES = (
+    ("RSM", "Reflective Shadow Maps", "One bounce gathered from virtual point lights on what the lights see"),
+    ("SSDO", "Screen-Space Directional Occlusion", "Bounces gathered from what the camera sees"),
+)
 
 
 @dataclass
@@ -103,6 +106,28 @@ class WorldSettings:
         512, "Resolution", "Texels along one side of those shadow maps", low=64, high=4096, unit="px",
         higher="finer openings", lower="faster, leaks through small walls",
     )  # fmt: skip
+    aimed: bool = _setting(
+        True, "Aim at Openings", "Draw the directions of direct light mostly from the parts of the sky that visible "
+        "surfaces see, from four sub-frames on",
+    )  # fmt: skip
+
+
+@dataclass
+class VolumeSettings:
+    """Light scattered in the air."""
+
+    samples: int = _setting(
+        8, "Samples", "Points of a pixel's ray that are tested for each light, per sub-frame", low=1, high=256,
+        higher="less noise in shafts of light", lower="faster",
+    )  # fmt: skip
+    density: float = _setting(
+        0.0, "Haze", "Share of light scattered per metre by a haze that fills the scene's bounds, where the world has no "
+        "volume of its own", low=0.0, high=1e3, soft_high=1.0, unit="1/m", higher="thicker", lower="0 is clear air",
+    )  # fmt: skip
+    anisotropy: float = _setting(
+        0.0, "Haze Anisotropy", "Mean cosine of the angle that the haze scatters by", low=-0.99, high=0.99,
+        higher="glows around lights", lower="negative: scatters back",
+    )  # fmt: skip
 
 
 @dataclass
@@ -116,6 +141,73 @@ class RSMSettings:
     samples: int = _setting(
         200, "Samples", "Virtual point lights gathered per pixel and sub-frame", low=1, high=4096,
         higher="less blotchy near surfaces", lower="faster",
+    )  # fmt: skip
+    visibility: str = _setting(
+        "CELLS", "Visibility", "Whether virtual lights are blocked by objects",
+        choices=(("NONE", "None", "They shine through everything, as in 2005; near contacts are dimmed by ambient occlusion"),
+                 ("CELLS", "Cells", "Rays to them are tested in a grid of the cells that surfaces pass through")),
+    )  # fmt: skip
+    visibility_resolution: int = _setting(
+        128, "Visibility Resolution", "Cells along the scene's longest side", low=16, high=512,
+        higher="finer shadows in indirect light", lower="faster",
+    )  # fmt: skip
+
+
+@dataclass
+class SSDOSettings:
+    """Screen-space directional occlusion (Ritschel, Grosch and Seidel 2009)."""
+
+    samples: int = _setting(
+        256, "Samples", "Points tested in the depth buffer per gathering pixel, sub-frame and bounce", low=8, high=4096,
+        higher="less noise", lower="faster",
+    )  # fmt: skip
+    steps: int = _setting(
+        16, "Steps", "How many of the samples lie along one ray, or on one side of one slice", low=2, high=256,
+        higher="finds thin and far things; fewer directions", lower="more directions; misses small things",
+    )  # fmt: skip
+    integrator: str = _setting(
+        "BITMASK", "Integrator", "How directions are covered",
+        choices=(("RAYS", "Rays", "Cosine-distributed rays, each followed to its first hit"),
+                 ("BITMASK", "Visibility Bitmask", "Slices of the hemisphere in 32 sectors that samples fill")),
+    )  # fmt: skip
+    radius: float = _setting(
+        0.0, "Radius", "How far away light is gathered from; 0 is everywhere on the screen", low=0.0, high=1e6,
+        soft_high=100.0, unit="m", higher="light from farther away", lower="finer near by, dark rooms",
+    )  # fmt: skip
+    thickness: float = _setting(
+        0.5, "Thickness", "How thick what the screen shows is taken to be, as a share of its distance from the receiver",
+        low=0.01, high=10.0, higher="fewer leaks behind things", lower="light passes behind thin things",
+    )  # fmt: skip
+    occlusion: str = _setting(
+        "BITMASK", "Ambient Occlusion", "How the Ambient Occlusion pass is made",
+        choices=(("BITMASK", "Visibility Bitmask", "Sectors of slices that samples fill"),
+                 ("MITTRING", "Mittring", "Points along directions, as the other techniques and the paper do")),
+    )  # fmt: skip
+    shadows: str = _setting(
+        "MAPS", "Shadows", "Where shadows come from",
+        choices=(("MAPS", "Shadow Maps", "What every light sees"),
+                 ("CONTACT", "Maps and Contacts", "Shadow maps, and short rays through the depth buffer over them"),
+                 ("SCREEN", "Screen", "Rays through the depth buffer alone: what is not in the picture throws no shadow")),
+    )  # fmt: skip
+    contact: float = _setting(
+        0.02, "Contact", "Length of the rays for contact shadows, as a share of the scene's radius", low=0.0, high=2.0,
+        higher="longer fine shadows", lower="only where things touch",
+    )  # fmt: skip
+    volumetric: str = _setting(
+        "MARCH", "Volumetric", "How light in the air is shadowed",
+        choices=(("MARCH", "Shadow Maps", "Points on each pixel's ray are looked up in the lights' maps"),
+                 ("RADIAL", "Radial Blur", "The share of the screen between a pixel and the light that does not hide it; the "
+                  "light must be in the picture")),
+    )  # fmt: skip
+    margin: float = _setting(
+        0.0, "Margin", "How much is drawn beyond each side of the picture, as a share of its longer side: what lies there "
+        "still counts", low=0.0, high=1.0, higher="light from just outside", lower="faster",
+    )  # fmt: skip
+    sources: str = _setting(
+        "MAPS", "World and Emitters", "How the world and emissive surfaces light the scene",
+        choices=(("MAPS", "Shadow Maps", "As lights with shadow maps, on and off the screen"),
+                 ("SCREEN", "Screen", "Directional occlusion: directions that meet nothing on the screen see the world, the "
+                  "others the emissive pixels")),
     )  # fmt: skip
 
 
@@ -139,8 +231,12 @@ class Settings:
         16, "Viewport Samples", "Sub-frames averaged in the viewport while nothing changes", low=1, high=65536,
         soft_high=256, higher="smoother after a while", lower="settles sooner",
     )  # fmt: skip
+    motion_steps: int = _setting(
+        8, "Motion Steps", "Times at which the scene is read while the shutter is open, with motion blur switched on; the "
+        "sub-frames are shared among them", low=1, high=256, higher="smoother streaks, longer sync", lower="faster; 1 is sharp",
+    )  # fmt: skip
     bounces: int = _setting(
-        1, "Bounces", "Diffuse bounces of light; 1 is the paper's", low=0, high=1,
+        1, "Bounces", "Diffuse bounces of light; 1 is the paper's", low=0, high=8,
         higher="brighter interiors", lower="0 is direct light only",
     )  # fmt: skip
     gather_scale: int = _setting(
@@ -159,7 +255,9 @@ class Settings:
     shadows: ShadowSettings = _group(ShadowSettings)
     ao: AOSettings = _group(AOSettings)
     world: WorldSettings = _group(WorldSettings)
+    volume: VolumeSettings = _group(VolumeSettings)
     rsm: RSMSettings = _group(RSMSettings)
+    ssdo: SSDOSettings = _group(SSDOSettings)
 
     # -- access by dotted name ---------------------------------------------------------------------------------
 

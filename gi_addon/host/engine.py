@@ -22,7 +22,7 @@ from ..scene import Scene
 from ..settings import SettingError, Settings
 from . import properties, status
 from .compat import pass_name
-from .sync import SceneSync
+from .sync import SceneSync, share_meshes
 from .viewport import Viewport, close_all
 
 _POLL_SECONDS = 0.05
@@ -46,6 +46,7 @@ class Job:
     layer: str
     film_transparent: bool
     persistent: bool
+    motion: tuple[Scene, ...] = ()
     preview: bool = False
     timed: bool = False
 
@@ -100,11 +101,34 @@ class QuartetEngine(bpy.types.RenderEngine):
         settings = properties.read(scene)
         if self.is_preview:
             settings.samples = _PREVIEW_SAMPLES
+        motion = self._read_motion(depsgraph, resolution, min(settings.motion_steps, settings.samples))
         measure = not self.is_preview and any(wm.quartet.measure for wm in bpy.data.window_managers)
         return Job(
-            plain, settings, wanted, resolution, region, layer.name, bool(render.film_transparent), persistent,
+            plain, settings, wanted, resolution, region, layer.name, bool(render.film_transparent), persistent, motion,
             preview=self.is_preview, timed=measure,
         )  # fmt: skip
+
+    def _read_motion(self, depsgraph, resolution: tuple[int, int], steps: int) -> tuple[Scene, ...]:
+        """The scene at ``steps`` times while the shutter is open, in order; nothing without motion blur. Meshes that are
+        the same at all times are one object."""
+        scene = depsgraph.scene
+        if not scene.render.use_motion_blur or steps < 2:
+            return ()
+        shutter = scene.render.motion_blur_shutter
+        start = {"START": 0.0, "CENTER": -0.5, "END": -1.0}[scene.render.motion_blur_position] * shutter
+        frame, sub = scene.frame_current, scene.frame_subframe
+        states: list[Scene] = []
+        try:
+            for k in range(steps):
+                time = frame + sub + start + shutter * (k + 0.5) / steps
+                whole = int(np.floor(time))
+                self.frame_set(whole, time - whole)
+                state = self._sync.read(depsgraph, resolution=resolution)
+                share_meshes(state, states[-1] if states else None)
+                states.append(state)
+        finally:
+            self.frame_set(frame, sub)
+        return tuple(states)
 
     def render(self, depsgraph) -> None:
         """Render the job and write the result. Never raises: Blender would show a black picture and call it done."""
@@ -143,6 +167,7 @@ class QuartetEngine(bpy.types.RenderEngine):
             result = renderer.render(
                 job.scene, job.settings, job.outputs, resolution=job.resolution, region=job.region,
                 film_transparent=job.film_transparent, progress=progress, cancel=cancel, timed=job.timed,
+                motion=job.motion,
             )  # fmt: skip
             if not job.preview:
                 report = status.summarise("final", renderer, result.plan, job.scene, result.subframes, result.seconds)

@@ -379,7 +379,11 @@ def view_camera(view: bpy.types.RegionView3D, scene: Scene, size: tuple[int, int
         world_from_view[:3, 3] += world_from_view[:3, 2] * back
         clip_from_view[2, 3] -= clip_from_view[2, 2] * -back
         near, far = max(near + back, 1e-3 * radius), far + back
-    return Camera(world_from_view, clip_from_view, near, far, aperture, focus or 10.0, name)
+    camera = Camera(world_from_view, clip_from_view, near, far, aperture, focus or 10.0, name)
+    if aperture > 0.0:
+        lens = scene.camera
+        camera.blades, camera.blade_turn, camera.blade_ratio = lens.blades, lens.blade_turn, lens.blade_ratio
+    return camera
 
 
 def _clip_planes(clip_from_view: np.ndarray) -> tuple[float, float]:
