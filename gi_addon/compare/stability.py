@@ -60,7 +60,7 @@ KNOWN: dict[tuple[str, str], str] = {
     **dict.fromkeys((("SSDO", "8"), ("SSDO", "11"), ("SSDO", "13"), ("VCT", "8"), ("VCT", "9")), _GATHER),
     **dict.fromkeys((("SSDO", "6"), ("SSDO", "7"), ("VCT", "6")), _NOISE),
     ("SSDO", "10"): "directions differ from pixel to pixel: 16 sub-frames leave 1.8 % of noise",
-    ("VCT", "5"): "light gets through a wall of two cells, by 1.2 % where the limit is 1 %; three cells hold",
+    ("VCT", "5"): "light gets through a wall of two cells, by 1.2 % where the limit is 1 %; four cells hold",
     ("VCT", "10"): "cones differ from pixel to pixel: 16 sub-frames leave 6 % of noise in a grid of 32 cells",
     ("VCT", "13"): "the gain drifts by 4 % from 32 to 128 cells, and the gather is interpolated",
 }
