@@ -23,7 +23,7 @@ class Facts:
     """Facts about one frame. Reasons that passes give for their absence come from these."""
 
     settings: Settings
-    resolution: tuple[int, int]
+    resolution: tuple[int, int]  # of what is drawn: the picture and its margin
     outputs: tuple[str, ...]
     subframes: int
     rig: LightRig
@@ -39,7 +39,9 @@ class Facts:
     layered: bool
     world_black: bool
     ao_distance: float
+    world_visible: bool = True  # to the camera
     medium: Medium | None = None  # that fills the world
+    margin: int = 0  # px drawn beyond each side of the picture
     stamps: dict[str, str] = field(default_factory=dict)
 
     @property
@@ -48,8 +50,23 @@ class Facts:
         return film_layers(self.outputs)
 
     @property
+    def picture(self) -> tuple[int, int]:
+        """Size of the picture, px."""
+        return (self.resolution[0] - 2 * self.margin, self.resolution[1] - 2 * self.margin)
+
+    @property
     def lit(self) -> bool:
-        return bool(self.rig.sources)
+        return bool(self.rig.sources) or (self.screen_sources and (self.emissive_light or not self.world_black))
+
+    @property
+    def emissive_light(self) -> bool:
+        """Whether what emits also lights."""
+        return self.emissive and self.settings.use_area_lights
+
+    @property
+    def screen_sources(self) -> bool:
+        """Whether the world and emissive surfaces light what they do on the screen, not as lights with maps."""
+        return self.settings.technique == "SSDO" and self.settings.ssdo.sources == "SCREEN"
 
 
 def gather_facts(
@@ -62,14 +79,17 @@ def gather_facts(
     world: WorldMap | None,
     emitters: Emitters,
 ) -> Facts:
-    """Look at everything once."""
+    """Look at everything once. ``resolution`` is the picture's."""
+    margin = round(settings.ssdo.margin * max(resolution)) if settings.technique == "SSDO" else 0
     bounds = scene.bounds()
     s = settings
+    from_screen = s.technique == "SSDO" and s.ssdo.sources == "SCREEN"
     rig = build_rig(
         scene.lights, bounds,
-        world=world, world_samples=s.world.samples,
-        emitters=emitters, emitter_samples=_EMITTER_SAMPLES, area_lights=s.use_area_lights,
-        shadows=s.use_shadows, bounces=s.use_indirect_diffuse and s.bounces > 0,
+        world=None if from_screen else world, world_samples=s.world.samples,
+        emitters=Emitters.none() if from_screen else emitters, emitter_samples=_EMITTER_SAMPLES, area_lights=s.use_area_lights,
+        shadows=s.use_shadows and not (s.technique == "SSDO" and s.ssdo.shadows == "SCREEN"),
+        bounces=s.use_indirect_diffuse and s.bounces > 0 and s.technique != "SSDO",
         shadow_resolution=s.shadows.resolution, bounce_resolution=s.rsm.resolution,
         world_resolution=s.world.resolution,
     )  # fmt: skip
@@ -78,7 +98,8 @@ def gather_facts(
     some = [compiled[m] for m in used]
     return Facts(
         settings=s,
-        resolution=resolution,
+        resolution=(resolution[0] + 2 * margin, resolution[1] + 2 * margin),
+        margin=margin,
         outputs=outputs,
         subframes=subframes,
         rig=rig,
@@ -94,6 +115,7 @@ def gather_facts(
         layered=any(c.glossy or c.transmissive for c in compiled),
         world_black=world is None or world.black,
         ao_distance=s.ao.distance or scene.world.ao_distance,
+        world_visible=scene.world.visible_camera,
         medium=mean_medium(scene.world.graph, scene.images),
         stamps=scene.stamps(),
     )

@@ -23,7 +23,7 @@ void main()
     float share = max(1.0 - opacity - vector_mean(c.transparent), 1e-4);
     vec3 color = (c.transmission + c.translucent) / share;
 #if TINT_ONLY
-    gbuf_transmission = vec4(color, 1.0);
+    gbuf_transmission = vec4(color, 0.0); // alpha says that there is one: clear glass has tint 1
 #else
     vec3 n = safe_normalize(c.normal_ws);
     n = dot(n, n) < 0.5 ? p.normal_ws : n;
