@@ -52,7 +52,10 @@ def _group(cls: type) -> Any:
     return field(default_factory=cls)
 
 
-TECHNIQUES = (("RSM", "Reflective Shadow Maps", "One bounce gathered from virtual point lights on what the lights see"),)
+TECHNIQUES = (
+    ("RSM", "Reflective Shadow Maps", "One bounce gathered from virtual point lights on what the lights see"),
+    ("LPV", "Light Propagation Volumes", "Bounces carried through a grid of cells over the scene"),
+)
 
 
 @dataclass
@@ -120,6 +123,22 @@ class RSMSettings:
 
 
 @dataclass
+class LPVSettings:
+    """Light propagation volumes (Kaplanyan and Dachsbacher 2010)."""
+
+    resolution: int = _setting(
+        32, "Resolution", "Cells along the longest side of the scene", low=8, high=128, unit="cells",
+        higher="finer indirect light, less leaking through walls", lower="faster",
+    )  # fmt: skip
+    directions: str = _setting(
+        "50", "Directions", "Directions that light travels in through the grid",
+        choices=(("26", "26", "Faster; small bright patches may show as rays"), ("50", "50", "Smoother"),
+                 ("110", "110", "For fine grids")),
+    )  # fmt: skip
+    occlusion: bool = _setting(True, "Occlusion", "Objects stop light on its way through the grid")
+
+
+@dataclass
 class Settings:
     """All of ``scene.quartet``."""
 
@@ -160,6 +179,7 @@ class Settings:
     ao: AOSettings = _group(AOSettings)
     world: WorldSettings = _group(WorldSettings)
     rsm: RSMSettings = _group(RSMSettings)
+    lpv: LPVSettings = _group(LPVSettings)
 
     # -- access by dotted name ---------------------------------------------------------------------------------
 

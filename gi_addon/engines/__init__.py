@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from ..graph import Pass
 from ..settings import Settings
-from . import rsm
+from . import lpv, rsm
 
 # Technique -> its passes in execution order, for the settings and the film layers wanted.
-TECHNIQUES: dict[str, Callable[[Settings, tuple[str, ...]], list[Pass]]] = {"RSM": rsm.passes}
+TECHNIQUES: dict[str, Callable[[Settings, tuple[str, ...]], list[Pass]]] = {"RSM": rsm.passes, "LPV": lpv.passes}

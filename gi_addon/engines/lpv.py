@@ -1,0 +1,352 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Light propagation volumes, Figure 4b of the paper.
+
+A. Kaplanyan and C. Dachsbacher, "Cascaded Light Propagation Volumes for Real-Time Indirect Illumination", I3D 2010. What the
+lights see is injected into a grid over the scene, carried from cell to cell along discrete ordinates, stopped by a volume of
+the scene's geometry, and looked up at each pixel.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+
+from ..facts import Facts
+from ..frame import Frame
+from ..gpu_types import LIGHT_AREA, LIGHT_SUN, LIGHT_WORLD
+from ..graph import Buffer, Optional, Pass, Planned, Texture, Uniform
+from ..passes.ao import AOBlur, AOGeneration
+from ..passes.brdf_tables import BRDFTables
+from ..passes.direct_lighting import DirectLighting
+from ..passes.gbuffer import GBuffer, TranslucentTint, _screen
+from ..passes.lights import LightList, RSMGeneration, ShadowMaps
+from ..passes.resolve import Resolve
+from ..scene import SHADOW
+from ..settings import Settings
+
+SH_COUNT = 9
+# Points of a cell's cross-section that the geometry is tested at, along each side; 16 bits a face (geometry_lib.glsl).
+_POINTS = 4
+# Bytes of ordinates carried at once; more go in turns, so that fine grids fit.
+_BATCH_BYTES = 64 << 20
+# Texels along a side of a 3D texture that every OpenGL 4.3 allows.
+_LEAST_3D_SIZE = 2048
+# Fixed point keeps two of 32 bits for what the bound of a cell's flux leaves out (shading normals at grazing light).
+_FIXED_UNITS = float(1 << 29)
+# Lights weaker than the group's brightest by more than this are summed in units of their own: a texel of a 256² cube map
+# then still is 2²⁹ / (6 · 256² · 16 · 4) > 20 units.
+_GROUP_RATIO = 16.0
+
+
+def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
+    """Figure 4b, in order."""
+    return [
+        BRDFTables(),
+        LightList(),
+        ShadowMaps(),
+        RSMGeneration(),
+        RadianceInjection(),
+        GBuffer(),
+        TranslucentTint(),
+        GeometryInjection(),
+        Propagation(),
+        AOGeneration(),
+        AOBlur(),
+        IndirectLighting(),
+        DirectLighting(),
+        Resolve(layers),
+    ]
+
+
+# --- the grid ---------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Cubic cells over the scene: ``origin`` (3,) of cell 0's low corner and ``cell`` edge, m; ``size`` (3,) cells."""
+
+    origin: tuple[float, float, float]
+    cell: float
+    size: tuple[int, int, int]
+
+    @staticmethod
+    def over(bounds: np.ndarray, resolution: int) -> Grid:
+        """The grid of ``resolution`` cells along the longest side of ``bounds`` (2, 3), one of padding at each end."""
+        low, high = np.asarray(bounds, "f8")
+        extent = np.maximum(high - low, 0.0)
+        longest = float(extent.max()) or 1.0
+        cell = longest / (resolution - 2)
+        # A side of a whole number of cells must not gain one from rounding.
+        size = np.ceil(extent / cell - 1e-6).astype(int) + 2
+        origin = (low + high) / 2.0 - size * cell / 2.0
+        return Grid(tuple(float(v) for v in origin), cell, tuple(int(v) for v in size))
+
+    @property
+    def cells(self) -> int:
+        return int(np.prod(self.size))
+
+
+def grid(facts: Facts) -> Grid:
+    """The frame's grid."""
+    return Grid.over(facts.rig.bounds, facts.settings.lpv.resolution)
+
+
+def _sh_size(facts: Facts) -> tuple[int, int, int]:
+    nx, ny, nz = grid(facts).size
+    return nx, ny, nz * SH_COUNT
+
+
+_GRID = (
+    Uniform("grid_origin", "vec3", "low corner of the grid, world space, m"),
+    Uniform("grid_cell", "float", "edge of a cell, m"),
+    Uniform("grid_size", "ivec3", "cells along each axis"),
+)
+
+
+def _set_grid(frame: Frame, program, facts: Facts, **more) -> None:
+    g = grid(facts)
+    frame.set(program, grid_origin=g.origin, grid_cell=g.cell, grid_size=g.size, **more)
+
+
+def _bounce_off(facts: Facts) -> str | None:
+    if not facts.settings.use_indirect_diffuse:
+        return "indirect diffuse is switched off"
+    return "bounces is 0" if facts.settings.bounces == 0 else None
+
+
+# --- ordinates --------------------------------------------------------------------------------------------------------
+
+
+def ordinates(count: int) -> np.ndarray:
+    """Directions and weights (count, 4) f4, Σ weights = 4π: V. Lebedev's quadratures of 26 and 50 points (1976; exact to
+    degrees 7 and 11), symmetric under the 48 turns and mirrorings of the cube."""
+    def orbit(x: float, y: float, z: float) -> list[tuple[float, float, float]]:
+        found = set()
+        for p in ((x, y, z), (y, z, x), (z, x, y), (x, z, y), (y, x, z), (z, y, x)):
+            for sx in (-1, 1):
+                for sy in (-1, 1):
+                    for sz in (-1, 1):
+                        found.add(tuple(0.0 if v == 0 else v for v in (sx * p[0], sy * p[1], sz * p[2])))
+        return sorted(found)
+
+    r2, r3, r11 = 0.5**0.5, (1 / 3) ** 0.5, (1 / 11) ** 0.5
+    face, edge, corner, inner = (1.0, 0.0, 0.0), (r2, r2, 0.0), (r3, r3, r3), (r11, r11, 3 * r11)
+
+    def near(a: float) -> tuple[float, float, float]:
+        return a, a, (1.0 - 2.0 * a * a) ** 0.5
+
+    plane = 0.4783690288121502
+    rules = {
+        26: ((face, 1 / 21), (edge, 4 / 105), (corner, 9 / 280)),
+        110: (
+            (face, 0.3828270494937162e-2), (corner, 0.9793737512487512e-2),
+            (near(0.1851156353447362), 0.8211737283191111e-2), (near(0.6904210483822922), 0.9942814891178103e-2),
+            (near(0.3956894730559419), 0.9595471336070963e-2), ((plane, (1.0 - plane**2) ** 0.5, 0.0), 0.9694996361663028e-2),
+        ),
+        50: ((face, 4 / 315), (edge, 64 / 2835), (corner, 27 / 1280), (inner, 14641 / 725760)),
+    }
+    rows = [(*w, 4.0 * np.pi * weight) for point, weight in rules[count] for w in orbit(*point)]
+    return np.array(rows, "f4")
+
+
+def _batch(facts: Facts) -> int:
+    """Ordinates carried at once."""
+    g = grid(facts)
+    most = min(_BATCH_BYTES // (16 * g.cells), _LEAST_3D_SIZE // g.size[2])
+    return int(np.clip(most, 1, int(facts.settings.lpv.directions)))
+
+
+# --- passes -----------------------------------------------------------------------------------------------------------
+
+
+class RadianceInjection(Pass):
+    """Flux that the RSMs' texels reflect, into the cells in front of them."""
+
+    title = "LPV Radiance Injection"
+    figure = "LPV Radiance Injection"
+    reads = ("rsm.depth", "rsm.normal", "rsm.albedo", "rsm.lights", "rsm.views")
+    writes = (
+        Texture("lpv.source", "lpv_source", "harmonics of the intensity that surfaces send into each cell, over the face of a "
+                "cell, W/(m²·sr)", "rgba32f", _sh_size, access="readwrite"),
+        Buffer("lpv.flux", "lpv_flux", "its sums in fixed point: cell, harmonic, colour", "int", np.dtype("i4"),
+               lambda f: grid(f).cells * SH_COUNT * 3, scratch=True),
+    )  # fmt: skip
+    uniforms = (
+        *_GRID,
+        Uniform("tile", "int", "index of the view whose tile is injected"),
+        Uniform("fixed_scale", "float", "units of fixed point per W"),
+        Uniform("first_group", "int", "1 where the sums are the volume's first"),
+    )
+    shaders = {
+        "main": {"compute": "engines/lpv/inject_comp.glsl"},
+        "source": {"compute": "engines/lpv/source_comp.glsl"},
+    }
+    depends = ("lights", "world", "transforms", "meshes", "materials")
+    settings = ("lpv.resolution",)
+
+    def rate(self, facts: Facts) -> str:
+        return RSMGeneration().rate(facts)
+
+    def absent(self, facts: Facts) -> str | None:
+        return _bounce_off(facts)
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        facts = planned.facts
+        inject, source = frame.program(planned), frame.program(planned, "source")
+        sample = frame.light_sample(bounce=True)
+        flux = frame.resources["lpv.flux"]
+        for first, (scale, lights) in enumerate(fixed_point_groups(sample.lights, grid(facts).cell)):
+            flux.clear()
+            for tile, view in enumerate(sample.views):
+                if int(view["light"]) in lights:
+                    _set_grid(frame, inject, facts, tile=tile, fixed_scale=scale)
+                    frame.compute(planned, inject, (int(view["rect"][2]), int(view["rect"][3])))
+            _set_grid(frame, source, facts, fixed_scale=scale, first_group=int(first == 0))
+            frame.compute(planned, source, _sh_size(facts), (4, 4, 4))
+
+
+def fixed_point_groups(lights: np.ndarray, cell: float) -> list[tuple[float, set[int]]]:
+    """(units per W, indices of LIGHT rows) of lights that may share integer sums: the sum of the fluxes that each can bring
+    into one cell stays below the integers' end, and no light is lost below their unit."""
+    emission = np.abs(lights["emission"]).max(axis=1).astype("f8")
+    directional = np.isin(lights["kind"], (LIGHT_SUN, LIGHT_WORLD))
+    # A lamp: all its power. Parallel light: surfaces that end in one cell lie within three cells of it, and that box shows
+    # the light at most √3 · 9 h² < 16 h² of cross-section.
+    solid_angle = np.where(lights["kind"] == LIGHT_AREA, 2.0 * np.pi, 4.0 * np.pi)
+    bound = np.where(directional, emission * 16.0 * cell * cell, emission * solid_angle)
+    groups: list[tuple[float, set[int]]] = []
+    order = [int(i) for i in np.argsort(-bound, kind="stable") if bound[i] > 0.0]
+    while order:
+        brightest = bound[order[0]]
+        group = [i for i in order if bound[i] * _GROUP_RATIO >= brightest]
+        order = [i for i in order if i not in group]
+        groups.append((_FIXED_UNITS / float(bound[group].sum()), set(group)))
+    return groups
+
+
+class GeometryInjection(Pass):
+    """Which share of the way between neighbouring cells is blocked, by drawing the scene along each axis."""
+
+    title = "LPV Geometry Injection"
+    figure = "Geometry Injection"
+    writes = (
+        Buffer("lpv.faces", "lpv_faces", "per cell and axis: covered points, fragments, sums of their places and normals",
+               "uint", np.dtype("u4"), lambda f: grid(f).cells * 15),
+        Texture("lpv.raster", "lpv_raster", "what the surfaces are drawn to; nobody reads it", "r8",
+                lambda f: (_POINTS * max(grid(f).size),) * 2, scratch=True),
+    )  # fmt: skip
+    uniforms = (*_GRID, Uniform("axis", "int", "axis that the scene is drawn along"))
+    depends = ("transforms", "meshes", "materials")
+    settings = ("lpv.resolution", "lpv.occlusion")
+
+    def rate(self, facts: Facts) -> str:
+        return "static"
+
+    def absent(self, facts: Facts) -> str | None:
+        if not facts.settings.lpv.occlusion:
+            return "occlusion is switched off"
+        return None if facts.triangles else "the scene has no surfaces"
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        facts = planned.facts
+        g = grid(facts)
+        ctx = frame.gl.ctx
+        frame.resources["lpv.faces"].clear()
+        fbo = frame.targets(planned)
+        fbo.use()
+        fbo.scissor = None
+        ctx.enable_only(moderngl.NOTHING)
+        frame.bind(planned)
+        stages = {"vertex": "surface/surface_vert.glsl", "fragment": "engines/lpv/geometry_frag.glsl"}
+        options = {
+            "full": False, "units": len(planned.texture_reads()), "defines": {
+                "SURFACE_TABLES": 0, "SURFACE_SEE_THROUGH_GLASS": 1, "SURFACE_SEEN_BY_CAMERA": 0,
+                "SURFACE_SEEN_BY_SHADOW": 1,
+            },
+        }  # fmt: skip
+        programs = frame.gpu.programs(planned, stages, SHADOW, **options)
+        for axis in range(3):
+            u, v = (axis + 1) % 3, (axis + 2) % 3
+            fbo.viewport = (0, 0, _POINTS * g.size[u], _POINTS * g.size[v])
+            clip = np.zeros((4, 4))
+            for row, k in enumerate((u, v, axis)):
+                scale = 2.0 / (g.size[k] * g.cell)
+                clip[row, k], clip[row, 3] = scale, -1.0 - scale * g.origin[k]
+            clip[3, 3] = 1.0
+            for program in programs:
+                _set_grid(frame, program, facts, axis=axis)
+            frame.gpu.draw(planned, stages, SHADOW, np.ascontiguousarray(clip.T, "f4"), **options)
+        ctx.memory_barrier(moderngl.ALL_BARRIER_BITS)
+
+
+class Propagation(Pass):
+    """Light carried from cell to cell along each ordinate, and its harmonics in every cell."""
+
+    title = "LPV Propagation"
+    figure = "LPV Propagation"
+    reads = ("lpv.source", Optional("lpv.faces"))
+    writes = (
+        Texture("lpv.volume", "lpv_volume", "harmonics of the radiance in each cell by direction of travel, W/(m²·sr)",
+                "rgba32f", _sh_size, access="readwrite"),
+        Texture("lpv.radiance", "lpv_radiance", "radiance along each ordinate of a batch, W/(m²·sr)", "rgba32f",
+                lambda f: (*grid(f).size[:2], grid(f).size[2] * _batch(f)), access="readwrite", scratch=True),
+        Buffer("lpv.ordinates", "ordinates", "unit vectors and solid angles", "vec4", np.dtype(("f4", (4,))),
+               lambda f: int(f.settings.lpv.directions), scratch=True),
+    )  # fmt: skip
+    uniforms = (
+        *_GRID,
+        Uniform("batch_first", "int", "index of the batch's first ordinate"),
+        Uniform("batch_count", "int", "ordinates in the batch"),
+        Uniform("wave", "int", "the diagonal plane whose cells take their light"),
+    )
+    shaders = {
+        "expand": {"compute": "engines/lpv/expand_comp.glsl"},
+        "main": {"compute": "engines/lpv/propagate_comp.glsl"},
+        "gather": {"compute": "engines/lpv/gather_comp.glsl"},
+    }
+    depends = ("lights", "world", "transforms", "meshes", "materials")
+    settings = ("lpv.resolution", "lpv.directions", "lpv.occlusion")
+
+    def rate(self, facts: Facts) -> str:
+        return RSMGeneration().rate(facts)
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        facts = planned.facts
+        g = grid(facts)
+        table = ordinates(int(facts.settings.lpv.directions))
+        frame.upload("lpv.ordinates", table)
+        expand, carry, gather = (frame.program(planned, k) for k in ("expand", "main", "gather"))
+        size = _batch(facts)
+        frame.bind(planned)
+        for first in range(0, len(table), size):
+            count = min(size, len(table) - first)
+            _set_grid(frame, expand, facts, batch_first=first, batch_count=count)
+            frame.compute(planned, expand, (*g.size[:2], g.size[2] * count), (4, 4, 4))
+            _set_grid(frame, carry, facts, batch_first=first, batch_count=count)
+            for wave in range(sum(g.size) - 2):
+                carry["wave"].value = wave
+                carry.run(-(-g.size[0] // 8), -(-g.size[1] // 8), count)
+                frame.gl.ctx.memory_barrier(moderngl.SHADER_IMAGE_ACCESS_BARRIER_BIT)
+            _set_grid(frame, gather, facts, batch_first=first, batch_count=count)
+            frame.compute(planned, gather, g.size, (4, 4, 4))
+
+
+class IndirectLighting(Pass):
+    """The volume looked up at each pixel."""
+
+    title = "LPV Lighting Computation"
+    figure = "LPV Lighting Computation"
+    reads = ("lpv.volume", Optional("lpv.faces"), "gbuffer.depth", "gbuffer.normal")
+    writes = (
+        Texture("indirect.diffuse", "indirect_diffuse", "radiance a white Lambert surface would reflect, W/(m²·sr)",
+                "rgba32f", _screen, when=lambda f: None if f.diffuse else "no visible material is diffuse"),
+    )  # fmt: skip
+    uniforms = _GRID
+    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/lpv/lighting_frag.glsl"}}
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        program = frame.program(planned)
+        _set_grid(frame, program, planned.facts)
+        frame.screen(planned, program)

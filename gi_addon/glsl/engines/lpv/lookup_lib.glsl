@@ -1,0 +1,80 @@
+// Looking up the volume at a surface. Included where `lpv_volume` and, if there is one, `lpv_faces` are declared.
+//
+// The volume holds radiance by direction of travel, coefficients L_lm. Irradiance on a surface of normal n counts light that
+// travels against n with its cosine: E(n) = ∫ L(ω) max(−ω·n, 0) dω = π Σ_lm share(l) L_lm Y_lm(−n), the cosine lobe's
+// coefficients over π being share(l) Y_lm. So E/π, what a white Lambert surface reflects, is the plain sum.
+
+#include "engines/lpv/geometry_lib.glsl"
+
+struct VolumeSample {
+    vec3 sh[SH_COUNT];
+    float weight; // of the eight cells, how much stands on the open side of the walls
+};
+
+// The eight cells around grid point `at`, trilinear; a cell behind the tangent plane of `surface` (a grid point, unit normal
+// `n`) does not count, nor one behind a wall that stands between `at` and its centre.
+VolumeSample volume_sample(vec3 at, vec3 surface, vec3 n)
+{
+    VolumeSample s;
+    for (int c = 0; c < SH_COUNT; ++c) {
+        s.sh[c] = vec3(0.0);
+    }
+    s.weight = 0.0;
+    vec3 base = floor(at - 0.5);
+    vec3 f = at - 0.5 - base;
+    for (int i = 0; i < 8; ++i) {
+        ivec3 corner = ivec3(i & 1, (i >> 1) & 1, i >> 2);
+        ivec3 cell = ivec3(base) + corner;
+        vec3 t = mix(1.0 - f, f, vec3(corner));
+        float weight = t.x * t.y * t.z;
+        if (!inside_grid(cell, grid_size) || weight <= 0.0) {
+            continue;
+        }
+        // From the plane to half a cell in front of it, so that no cell appears at once.
+        weight *= saturate(2.0 * dot(vec3(cell) + 0.5 - surface, n));
+#if HAS_LPV_FACES
+        for (int axis = 0; axis < 3; ++axis) {
+            ivec3 upper = cell;
+            upper[axis] = int(base[axis]) + 1;
+            if (upper[axis] <= 0 || upper[axis] >= grid_size[axis]) {
+                continue;
+            }
+            int face = face_index(upper, axis, grid_size);
+            float coverage = face_coverage(face);
+            bool above = face_place(face) > f[axis];
+            if (coverage > 0.0 && above == (corner[axis] == 1)) {
+                weight *= 1.0 - coverage;
+            }
+        }
+#endif
+        if (weight > 0.0) {
+            for (int c = 0; c < SH_COUNT; ++c) {
+                s.sh[c] += weight * texelFetch(lpv_volume, cell + ivec3(0, 0, c * grid_size.z), 0).rgb;
+            }
+            s.weight += weight;
+        }
+    }
+    float scale = s.weight > 0.0 ? 1.0 / s.weight : 0.0;
+    for (int c = 0; c < SH_COUNT; ++c) {
+        s.sh[c] *= scale;
+    }
+    return s;
+}
+
+VolumeSample volume_at_surface(vec3 position_ws, vec3 ng)
+{
+    vec3 surface = (position_ws - grid_origin) / grid_cell;
+    return volume_sample(surface + ng * half_cell_shift(ng), surface, ng);
+}
+
+// E/π on a surface of unit normal n. Harmonics of order 2 of light from a side go below 0 behind it by a few per cent.
+vec3 volume_irradiance(VolumeSample s, vec3 n)
+{
+    float y[SH_COUNT];
+    sh_basis(-n, y);
+    vec3 sum = vec3(0.0);
+    for (int c = 0; c < SH_COUNT; ++c) {
+        sum += s.sh[c] * (sh_cosine_share(c) * y[c]);
+    }
+    return max(sum, vec3(0.0));
+}
