@@ -131,9 +131,8 @@ class LPVSettings:
         higher="finer indirect light, less leaking through walls", lower="faster",
     )  # fmt: skip
     directions: str = _setting(
-        "50", "Directions", "Directions that light travels in through the grid",
-        choices=(("26", "26", "Faster; small bright patches may show as rays"), ("50", "50", "Smoother"),
-                 ("110", "110", "For fine grids")),
+        "48", "Directions", "Directions that light travels in through the grid",
+        choices=(("48", "48", "Faster; small bright patches may show as rays"), ("72", "72", "Smoother")),
     )  # fmt: skip
     occlusion: bool = _setting(True, "Occlusion", "Objects stop light on its way through the grid")
 

@@ -9,6 +9,7 @@ the scene's geometry, and looked up at each pixel.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import permutations, product
 
 import moderngl
 import numpy as np
@@ -119,35 +120,24 @@ def _bounce_off(facts: Facts) -> str | None:
 # --- ordinates --------------------------------------------------------------------------------------------------------
 
 
+# Quadratures of the sphere that are symmetric under the cube's 48 turns and mirrorings and have no direction within 7° of a plane
+# of the grid: (coordinates of one point, share of 4π) per orbit. Exact to degrees 7 and 9, by Newton's method on the orbits'
+# moments, the widest spaced of the solutions found. Directions along the grid, as in Lebedev's sets, carry the outline of a lit
+# patch across the room unblurred: on the empty Cornell box, 50 of Lebedev's have relMSE .082 and 48 of these .04 at 32³.
+_ORBITS = {
+    48: (((0.25478280537, 0.25478280537, 0.932829804507), 0.49655563), ((0.266270511079, 0.68157905445, 0.68157905445), 0.50344437)),
+    72: (((0.142759509604, 0.142759509604, 0.979407701029), 0.22828848),
+         ((0.256275965365, 0.536578884934, 0.803993613046), 0.77171152)),
+}  # fmt: skip
+
+
 def ordinates(count: int) -> np.ndarray:
-    """Directions and weights (count, 4) f4, Σ weights = 4π: V. Lebedev's quadratures of 26 and 50 points (1976; exact to
-    degrees 7 and 11), symmetric under the 48 turns and mirrorings of the cube."""
-    def orbit(x: float, y: float, z: float) -> list[tuple[float, float, float]]:
-        found = set()
-        for p in ((x, y, z), (y, z, x), (z, x, y), (x, z, y), (y, x, z), (z, y, x)):
-            for sx in (-1, 1):
-                for sy in (-1, 1):
-                    for sz in (-1, 1):
-                        found.add(tuple(0.0 if v == 0 else v for v in (sx * p[0], sy * p[1], sz * p[2])))
-        return sorted(found)
-
-    r2, r3, r11 = 0.5**0.5, (1 / 3) ** 0.5, (1 / 11) ** 0.5
-    face, edge, corner, inner = (1.0, 0.0, 0.0), (r2, r2, 0.0), (r3, r3, r3), (r11, r11, 3 * r11)
-
-    def near(a: float) -> tuple[float, float, float]:
-        return a, a, (1.0 - 2.0 * a * a) ** 0.5
-
-    plane = 0.4783690288121502
-    rules = {
-        26: ((face, 1 / 21), (edge, 4 / 105), (corner, 9 / 280)),
-        110: (
-            (face, 0.3828270494937162e-2), (corner, 0.9793737512487512e-2),
-            (near(0.1851156353447362), 0.8211737283191111e-2), (near(0.6904210483822922), 0.9942814891178103e-2),
-            (near(0.3956894730559419), 0.9595471336070963e-2), ((plane, (1.0 - plane**2) ** 0.5, 0.0), 0.9694996361663028e-2),
-        ),
-        50: ((face, 4 / 315), (edge, 64 / 2835), (corner, 27 / 1280), (inner, 14641 / 725760)),
-    }
-    rows = [(*w, 4.0 * np.pi * weight) for point, weight in rules[count] for w in orbit(*point)]
+    """Directions and solid angles (count, 4) f4 of one of the quadratures; the solid angles sum to 4π sr."""
+    rows = []
+    for point, share in _ORBITS[count]:
+        places = sorted(set(permutations(point)))
+        found = [np.array(place) * signs for place in places for signs in product((-1.0, 1.0), repeat=3)]
+        rows += [(*w, 4.0 * np.pi * share / len(found)) for w in found]
     return np.array(rows, "f4")
 
 

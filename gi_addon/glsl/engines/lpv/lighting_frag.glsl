@@ -13,6 +13,6 @@ void main()
         return;
     }
     vec4 normals = texelFetch(gbuf_normal, pixel, 0);
-    VolumeSample s = volume_at_surface(position_ws_from_depth(uv, depth), octahedral_decode(normals.zw));
+    VolumeSample s = volume_at_surface(position_ws_from_depth(uv, depth), octahedral_decode(normals.zw), view_direction_ws(uv));
     indirect_diffuse = vec4(volume_irradiance(s, octahedral_decode(normals.xy)), 1.0);
 }

@@ -11,8 +11,22 @@ struct VolumeSample {
     float weight; // of the eight cells, how much stands on the open side of the walls
 };
 
+#if HAS_LPV_FACES
+// Share of the way along `axis` from `at` to the layer `side` (0 below, 1 above) that is open in the column through `cell`. `f`
+// is where `at` is between the layers, `upper` the upper one.
+float open_towards(ivec3 cell, int axis, int upper, int side, float f)
+{
+    cell[axis] = upper;
+    if (!inside_grid(cell, grid_size) || upper == 0) {
+        return 1.0;
+    }
+    int face = face_index(cell, axis, grid_size);
+    return (face_place(face) > f) == (side == 1) ? 1.0 - face_coverage(face) : 1.0;
+}
+#endif
+
 // The eight cells around grid point `at`, trilinear; a cell behind the tangent plane of `surface` (a grid point, unit normal
-// `n`) does not count, nor one behind a wall that stands between `at` and its centre.
+// `n`) does not count, nor one behind a wall that stands between `at` and its layer, in its own column or in the one of `at`.
 VolumeSample volume_sample(vec3 at, vec3 surface, vec3 n)
 {
     VolumeSample s;
@@ -34,17 +48,9 @@ VolumeSample volume_sample(vec3 at, vec3 surface, vec3 n)
         weight *= saturate(2.0 * dot(vec3(cell) + 0.5 - surface, n));
 #if HAS_LPV_FACES
         for (int axis = 0; axis < 3; ++axis) {
-            ivec3 upper = cell;
-            upper[axis] = int(base[axis]) + 1;
-            if (upper[axis] <= 0 || upper[axis] >= grid_size[axis]) {
-                continue;
-            }
-            int face = face_index(upper, axis, grid_size);
-            float coverage = face_coverage(face);
-            bool above = face_place(face) > f[axis];
-            if (coverage > 0.0 && above == (corner[axis] == 1)) {
-                weight *= 1.0 - coverage;
-            }
+            int upper = int(base[axis]) + 1;
+            weight *= min(open_towards(cell, axis, upper, corner[axis], f[axis]),
+                          open_towards(ivec3(floor(at)), axis, upper, corner[axis], f[axis]));
         }
 #endif
         if (weight > 0.0) {
@@ -61,10 +67,13 @@ VolumeSample volume_sample(vec3 at, vec3 surface, vec3 n)
     return s;
 }
 
-VolumeSample volume_at_surface(vec3 position_ws, vec3 ng)
+// In front of a surface seen from `eye_ws` (unit vector towards it). What the eye sees is on the open side of all walls, which a
+// point on an edge would not tell: it is moved to the eye so far that walls, whose places are rounded to 1/255, are passed by
+// lines of sight 5° and more off them.
+VolumeSample volume_at_surface(vec3 position_ws, vec3 ng, vec3 eye_ws)
 {
     vec3 surface = (position_ws - grid_origin) / grid_cell;
-    return volume_sample(surface + ng * half_cell_shift(ng), surface, ng);
+    return volume_sample(surface + ng * half_cell_shift(ng) + eye_ws * 0.05, surface, ng);
 }
 
 // E/π on a surface of unit normal n. Harmonics of order 2 of light from a side go below 0 behind it by a few per cent.
