@@ -28,8 +28,9 @@ from ..scene import SHADOW
 from ..settings import Settings
 
 SH_COUNT = 9
-# Points of a cell's cross-section that the geometry is tested at, along each side; 16 bits a face (geometry_lib.glsl).
-_POINTS = 4
+# Points of a cell's cross-section that the geometry is tested at, along each side: odd, so that one is in the middle, and
+# their squares are bits of one word.
+_POINTS = 5
 # Bytes of ordinates carried at once; more go in turns, so that fine grids fit.
 _BATCH_BYTES = 64 << 20
 # Texels along a side of a 3D texture that every OpenGL 4.3 allows.
@@ -222,17 +223,23 @@ class GeometryInjection(Pass):
     title = "LPV Geometry Injection"
     figure = "Geometry Injection"
     writes = (
+        Buffer("lpv.walls", "lpv_walls", "per cell and axis: blocked share of the way from the cell before, place, normal",
+               "vec4", np.dtype(("f4", (4,))), lambda f: grid(f).cells * 3),
         Buffer("lpv.faces", "lpv_faces", "per cell and axis: covered points, fragments, sums of their places and normals",
-               "uint", np.dtype("u4"), lambda f: grid(f).cells * 15),
+               "uint", np.dtype("u4"), lambda f: grid(f).cells * 15, scratch=True),
         Texture("lpv.raster", "lpv_raster", "what the surfaces are drawn to; nobody reads it", "r8",
                 lambda f: (_POINTS * max(grid(f).size),) * 2, scratch=True),
     )  # fmt: skip
     uniforms = (*_GRID, Uniform("axis", "int", "axis that the scene is drawn along"))
+    shaders = {"main": {"compute": "engines/lpv/walls_comp.glsl"}}
     depends = ("transforms", "meshes", "materials")
     settings = ("lpv.resolution", "lpv.occlusion")
 
     def rate(self, facts: Facts) -> str:
         return "static"
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return {"LPV_POINTS": _POINTS}
 
     def absent(self, facts: Facts) -> str | None:
         if not facts.settings.lpv.occlusion:
@@ -269,6 +276,9 @@ class GeometryInjection(Pass):
                 _set_grid(frame, program, facts, axis=axis)
             frame.gpu.draw(planned, stages, SHADOW, np.ascontiguousarray(clip.T, "f4"), **options)
         ctx.memory_barrier(moderngl.ALL_BARRIER_BITS)
+        program = frame.program(planned)
+        _set_grid(frame, program, facts)
+        frame.compute(planned, program, g.size, (4, 4, 4))
 
 
 class Propagation(Pass):
@@ -276,7 +286,7 @@ class Propagation(Pass):
 
     title = "LPV Propagation"
     figure = "LPV Propagation"
-    reads = ("lpv.source", Optional("lpv.faces"))
+    reads = ("lpv.source", Optional("lpv.walls"))
     writes = (
         Texture("lpv.volume", "lpv_volume", "harmonics of the radiance in each cell by direction of travel, W/(m²·sr)",
                 "rgba32f", _sh_size, access="readwrite"),
@@ -328,7 +338,7 @@ class IndirectLighting(Pass):
 
     title = "LPV Lighting Computation"
     figure = "LPV Lighting Computation"
-    reads = ("lpv.volume", Optional("lpv.faces"), "gbuffer.depth", "gbuffer.normal")
+    reads = ("lpv.volume", Optional("lpv.walls"), "gbuffer.depth", "gbuffer.normal")
     writes = (
         Texture("indirect.diffuse", "indirect_diffuse", "radiance a white Lambert surface would reflect, W/(m²·sr)",
                 "rgba32f", _screen, when=lambda f: None if f.diffuse else "no visible material is diffuse"),

@@ -1,5 +1,6 @@
-// Geometry injection: the scene rasterised along one axis, 4 × 4 points a cell. Each fragment covers its point of the face
-// between the two cell centres it lies between (geometry_lib.glsl). Bits and integer sums: the order of fragments is nothing.
+// Geometry injection: the scene rasterised along one axis, 5 × 5 points a cell. Each fragment covers its point of the column
+// between the two cell centres it lies between (geometry_lib.glsl). Per face: bits of the covered points; how many fragments;
+// sums of their places and of their normals' two components, in 1/255 of the range. Integers: the order of fragments is nothing.
 
 #if SURFACE_FULL
 #include "surface/surface_point.glsl"
@@ -8,6 +9,8 @@ in vec3 vary_position_ws;
 #endif
 
 #include "engines/lpv/geometry_lib.glsl"
+
+const int WORDS = 5;
 
 void main()
 {
@@ -21,16 +24,16 @@ void main()
 #endif
     vec3 at = (vary_position_ws - grid_origin) / grid_cell;
     float layer = floor(at[axis] + 0.5); // the face's place along its axis; the slab reaches half a cell to each side
-    ivec3 cell = ivec3(ivec2(gl_FragCoord.xy) / 4, 0);
+    ivec3 cell = ivec3(ivec2(gl_FragCoord.xy) / LPV_POINTS, 0);
     cell = axis == 0 ? ivec3(0, cell.x, cell.y) : axis == 1 ? ivec3(cell.y, 0, cell.x) : cell;
     cell[axis] = int(layer);
     lpv_raster = 1.0;
     if (!inside_grid(cell, grid_size)) {
         return;
     }
-    ivec2 point = ivec2(gl_FragCoord.xy) & 3;
-    int face = face_index(cell, axis, grid_size);
-    atomicOr(lpv_faces[face], 1u << (point.y * 4 + point.x + (ng[axis] >= 0.0 ? 0 : 16)));
+    ivec2 point = ivec2(gl_FragCoord.xy) % LPV_POINTS;
+    int face = face_index(cell, axis, grid_size) * WORDS;
+    atomicOr(lpv_faces[face], 1u << (point.y * LPV_POINTS + point.x));
     atomicAdd(lpv_faces[face + 1], 1u);
     atomicAdd(lpv_faces[face + 2], uint((at[axis] + 0.5 - layer) * 255.0 + 0.5));
     vec3 upward = ng[axis] >= 0.0 ? ng : -ng;

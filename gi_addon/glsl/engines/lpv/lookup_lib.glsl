@@ -1,4 +1,4 @@
-// Looking up the volume at a surface. Included where `lpv_volume` and, if there is one, `lpv_faces` are declared.
+// Looking up the volume at a surface. Included where `lpv_volume` and, if there is one, `lpv_walls` are declared.
 //
 // The volume holds radiance by direction of travel, coefficients L_lm. Irradiance on a surface of normal n counts light that
 // travels against n with its cosine: E(n) = ∫ L(ω) max(−ω·n, 0) dω = π Σ_lm share(l) L_lm Y_lm(−n), the cosine lobe's
@@ -11,17 +11,23 @@ struct VolumeSample {
     float weight; // of the eight cells, how much stands on the open side of the walls
 };
 
-#if HAS_LPV_FACES
-// Share of the way along `axis` from `at` to the layer `side` (0 below, 1 above) that is open in the column through `cell`. `f`
-// is where `at` is between the layers, `upper` the upper one.
-float open_towards(ivec3 cell, int axis, int upper, int side, float f)
+#if HAS_LPV_WALLS
+// Share of the way from `at` to the centre of `cell` that no wall blocks, as far as the face between the layers `upper` − 1 and
+// `upper` along `axis` tells in the column through `column`.
+float open_between(vec3 at, ivec3 cell, ivec3 column, int axis, int upper)
 {
-    cell[axis] = upper;
-    if (!inside_grid(cell, grid_size) || upper == 0) {
+    column[axis] = upper;
+    if (!inside_grid(column, grid_size) || upper == 0) {
         return 1.0;
     }
-    int face = face_index(cell, axis, grid_size);
-    return (face_place(face) > f) == (side == 1) ? 1.0 - face_coverage(face) : 1.0;
+    vec4 wall = lpv_walls[face_index(column, axis, grid_size)];
+    if (wall.x <= 0.0) {
+        return 1.0;
+    }
+    vec3 place = vec3(column) + 0.5;
+    place[axis] += wall.y - 1.0;
+    vec3 n = wall_normal(wall, axis);
+    return dot(at - place, n) * dot(vec3(cell) + 0.5 - place, n) < 0.0 ? 1.0 - wall.x : 1.0;
 }
 #endif
 
@@ -46,11 +52,10 @@ VolumeSample volume_sample(vec3 at, vec3 surface, vec3 n)
         }
         // From the plane to half a cell in front of it, so that no cell appears at once.
         weight *= saturate(2.0 * dot(vec3(cell) + 0.5 - surface, n));
-#if HAS_LPV_FACES
+#if HAS_LPV_WALLS
         for (int axis = 0; axis < 3; ++axis) {
             int upper = int(base[axis]) + 1;
-            weight *= min(open_towards(cell, axis, upper, corner[axis], f[axis]),
-                          open_towards(ivec3(floor(at)), axis, upper, corner[axis], f[axis]));
+            weight *= min(open_between(at, cell, cell, axis, upper), open_between(at, cell, ivec3(floor(at)), axis, upper));
         }
 #endif
         if (weight > 0.0) {

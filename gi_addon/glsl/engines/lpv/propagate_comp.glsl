@@ -53,23 +53,23 @@ void main()
         }
         if (local[axis] > 0) {
             float coverage = 0.0;
-#if HAS_LPV_FACES
-            int face = face_index(up[axis] ? cell : from, axis, grid_size);
-            coverage = face_coverage(face);
+#if HAS_LPV_WALLS
+            vec4 wall = lpv_walls[face_index(up[axis] ? cell : from, axis, grid_size)];
+            coverage = wall.x;
             if (coverage > 0.0) {
-                vec3 n = face_normal(face, axis) * (up[axis] ? 1.0 : -1.0);
+                vec3 n = wall_normal(wall, axis) * (up[axis] ? 1.0 : -1.0);
                 behind -= dot(w, n) < 0.0 ? share[axis] * coverage : 0.0;
             }
 #endif
             vec4 neighbour = imageLoad(lpv_radiance, from + ivec3(0, 0, slab));
             flux += (share[axis] * (1.0 - coverage) * neighbour.a) * neighbour.rgb;
         }
-#if HAS_LPV_FACES
+#if HAS_LPV_WALLS
         if (local[axis] < grid_size[axis] - 1) {
-            int face = face_index(up[axis] ? to : cell, axis, grid_size);
-            float coverage = face_coverage(face);
+            vec4 wall = lpv_walls[face_index(up[axis] ? to : cell, axis, grid_size)];
+            float coverage = wall.x;
             if (coverage > 0.0) {
-                vec3 n = face_normal(face, axis) * (up[axis] ? -1.0 : 1.0);
+                vec3 n = wall_normal(wall, axis) * (up[axis] ? -1.0 : 1.0);
                 ahead -= dot(w, n) >= 0.0 ? share[axis] * coverage : 0.0;
                 open_ahead -= share[axis] * coverage;
             }
