@@ -9,6 +9,7 @@
 #include "engines/rsm/rsm_lib.glsl"
 #include "engines/lpv/lpv_lib.glsl"
 #include "lib/sequence_lib.glsl"
+#include "lib/view_lib.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -22,6 +23,17 @@ void main()
     RsmTexel t = rsm_texel(tile, pixel);
     if (!is_finite(t.flux) || max3(t.flux) <= 0.0) {
         return;
+    }
+    // A surface that lies closer to the emissive mesh that lights it than the grid can tell is covered by it: what it sends
+    // back into the mesh, form factor K A/(1 + K A) of a disc of the source's area A (gather_lib.glsl), goes nowhere else.
+    Light light = rsm_lights[rsm_views[tile].light];
+    if (light.kind == LIGHT_MESH) {
+        vec3 d = light.position_ws - t.position_ws;
+        float d2 = max(dot(d, d), 1e-30);
+        if (d2 < sqr(grid_cell)) {
+            float facing = max(dot(d, t.normal_ws), 0.0) * abs(dot(d, light.axis_ws)) / (PI * d2 * d2);
+            t.flux /= 1.0 + facing * PI * sqr(light.patch_radius) * float(view.subframes);
+        }
     }
     vec3 at = (t.position_ws - grid_origin) / grid_cell + t.normal_ws * half_cell_shift(t.normal_ws);
     ivec3 cell = clamp(ivec3(floor(at)), ivec3(0), grid_size - 1);
