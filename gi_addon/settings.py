@@ -158,7 +158,7 @@ class Settings:
         soft_high=256, higher="smoother after a while", lower="settles sooner",
     )  # fmt: skip
     bounces: int = _setting(
-        1, "Bounces", "Diffuse bounces of light; 1 is the paper's", low=0, high=1,
+        1, "Bounces", "Diffuse bounces of light, as far as the technique can; 1 is the paper's", low=0, high=16,
         higher="brighter interiors", lower="0 is direct light only",
     )  # fmt: skip
     gather_scale: int = _setting(

@@ -53,7 +53,7 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         GBuffer(),
         TranslucentTint(),
         GeometryInjection(),
-        Propagation(),
+        Propagation(settings.bounces),
         AOGeneration(),
         AOBlur(),
         IndirectLighting(),
@@ -222,18 +222,22 @@ class GeometryInjection(Pass):
 
     title = "LPV Geometry Injection"
     figure = "Geometry Injection"
+    reads = tuple(Optional(f"brdf.{name}", ("lpv.albedo",)) for name in ("albedo", "average", "energy"))
     writes = (
         Buffer("lpv.walls", "lpv_walls", "per cell and axis: blocked share of the way from the cell before, place, normal",
                "vec4", np.dtype(("f4", (4,))), lambda f: grid(f).cells * 3),
         Buffer("lpv.faces", "lpv_faces", "per cell and axis: covered points, fragments, sums of their places and normals",
                "uint", np.dtype("u4"), lambda f: grid(f).cells * 15, scratch=True),
+        Buffer("lpv.albedo", "lpv_albedo", "per cell and axis: mean of albedo over |n|₁ (a float's bits), red, green, blue",
+               "uint", np.dtype("u4"), lambda f: grid(f).cells * 9,
+               when=lambda f: None if f.settings.bounces > 1 else "light bounces once, off what the lights see"),
         Texture("lpv.raster", "lpv_raster", "what the surfaces are drawn to; nobody reads it", "r8",
                 lambda f: (_POINTS * max(grid(f).size),) * 2, scratch=True),
     )  # fmt: skip
     uniforms = (*_GRID, Uniform("axis", "int", "axis that the scene is drawn along"))
     shaders = {"main": {"compute": "engines/lpv/walls_comp.glsl"}}
     depends = ("transforms", "meshes", "materials")
-    settings = ("lpv.resolution", "lpv.occlusion")
+    settings = ("lpv.resolution", "lpv.occlusion", "bounces")
 
     def rate(self, facts: Facts) -> str:
         return "static"
@@ -250,7 +254,9 @@ class GeometryInjection(Pass):
         facts = planned.facts
         g = grid(facts)
         ctx = frame.gl.ctx
-        frame.resources["lpv.faces"].clear()
+        reflect = planned.has("lpv.albedo")
+        for name in ("lpv.faces", "lpv.albedo") if reflect else ("lpv.faces",):
+            frame.resources[name].clear()
         fbo = frame.targets(planned)
         fbo.use()
         fbo.scissor = None
@@ -258,8 +264,8 @@ class GeometryInjection(Pass):
         frame.bind(planned)
         stages = {"vertex": "surface/surface_vert.glsl", "fragment": "engines/lpv/geometry_frag.glsl"}
         options = {
-            "full": False, "units": len(planned.texture_reads()), "defines": {
-                "SURFACE_TABLES": 0, "SURFACE_SEE_THROUGH_GLASS": 1, "SURFACE_SEEN_BY_CAMERA": 0,
+            "full": reflect, "units": len(planned.texture_reads()), "defines": {
+                "SURFACE_TABLES": 2 if planned.has("brdf.average") else 0, "SURFACE_SEE_THROUGH_GLASS": 1, "SURFACE_SEEN_BY_CAMERA": 0,
                 "SURFACE_SEEN_BY_SHADOW": 1,
             },
         }  # fmt: skip
@@ -286,7 +292,6 @@ class Propagation(Pass):
 
     title = "LPV Propagation"
     figure = "LPV Propagation"
-    reads = ("lpv.source", Optional("lpv.walls"))
     writes = (
         Texture("lpv.volume", "lpv_volume", "harmonics of the radiance in each cell by direction of travel, W/(m²·sr)",
                 "rgba32f", _sh_size, access="readwrite"),
@@ -299,30 +304,66 @@ class Propagation(Pass):
         *_GRID,
         Uniform("batch_first", "int", "index of the batch's first ordinate"),
         Uniform("batch_count", "int", "ordinates in the batch"),
+        Uniform("fixed_scale", "float", "units of fixed point per W"),
+        Uniform("bounced", "int", "1 to start from what the walls reflect too"),
         Uniform("wave", "int", "the diagonal plane whose cells take their light"),
     )
     shaders = {
         "expand": {"compute": "engines/lpv/expand_comp.glsl"},
         "main": {"compute": "engines/lpv/propagate_comp.glsl"},
         "gather": {"compute": "engines/lpv/gather_comp.glsl"},
+        "reflect": {"compute": "engines/lpv/reflect_comp.glsl"},
+        "bounced": {"compute": "engines/lpv/bounced_comp.glsl"},
     }
     depends = ("lights", "world", "transforms", "meshes", "materials")
-    settings = ("lpv.resolution", "lpv.directions", "lpv.occlusion")
+    settings = ("lpv.resolution", "lpv.directions", "lpv.occlusion", "bounces")
+
+    def __init__(self, bounces: int = 1) -> None:
+        self.reads = ("lpv.source", Optional("lpv.walls"))
+        if bounces > 1:
+            self.reads += (Optional("lpv.albedo"),)
+            self.writes += (
+                Texture("lpv.bounced", "lpv_bounced", "lpv.source and what the walls reflect of the volume's light", "rgba32f",
+                        _sh_size, access="readwrite", scratch=True),
+                Buffer("lpv.reflected", "lpv_reflected", "what the walls reflect in fixed point: cell, harmonic, colour", "int",
+                       np.dtype("i4"), lambda f: grid(f).cells * SH_COUNT * 3, scratch=True),
+            )  # fmt: skip
 
     def rate(self, facts: Facts) -> str:
         return RSMGeneration().rate(facts)
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return {"HAS_LPV_BOUNCED": int(facts.settings.bounces > 1)}
 
     def run(self, frame: Frame, planned: Planned) -> None:
         facts = planned.facts
         g = grid(facts)
         table = ordinates(int(facts.settings.lpv.directions))
         frame.upload("lpv.ordinates", table)
+        self._carry(frame, planned, table, bounced=False)
+        if planned.has("lpv.albedo"):
+            reflect, bounced = frame.program(planned, "reflect"), frame.program(planned, "bounced")
+            # Passive walls bring back less than came: the sum of all lights' bounds holds for every bounce.
+            groups = fixed_point_groups(frame.light_sample(bounce=True).lights, g.cell)
+            scale = 1.0 / sum(1.0 / group_scale for group_scale, _ in groups)
+            for _ in range(facts.settings.bounces - 1):
+                frame.resources["lpv.reflected"].clear()
+                _set_grid(frame, reflect, facts, fixed_scale=scale)
+                frame.compute(planned, reflect, g.size, (4, 4, 4))
+                _set_grid(frame, bounced, facts, fixed_scale=scale)
+                frame.compute(planned, bounced, _sh_size(facts), (4, 4, 4))
+                self._carry(frame, planned, table, bounced=True)
+
+    @staticmethod
+    def _carry(frame: Frame, planned: Planned, table: np.ndarray, *, bounced: bool) -> None:
+        """Fill the volume from the sources: the first ones, or those that a bounce was added to."""
+        facts = planned.facts
+        g = grid(facts)
         expand, carry, gather = (frame.program(planned, k) for k in ("expand", "main", "gather"))
         size = _batch(facts)
-        frame.bind(planned)
         for first in range(0, len(table), size):
             count = min(size, len(table) - first)
-            _set_grid(frame, expand, facts, batch_first=first, batch_count=count)
+            _set_grid(frame, expand, facts, batch_first=first, batch_count=count, bounced=int(bounced))
             frame.compute(planned, expand, (*g.size[:2], g.size[2] * count), (4, 4, 4))
             _set_grid(frame, carry, facts, batch_first=first, batch_count=count)
             for wave in range(sum(g.size) - 2):

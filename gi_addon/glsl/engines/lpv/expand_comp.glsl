@@ -16,7 +16,13 @@ void main()
     sh_basis(ordinates[batch_first + ordinate].xyz, y);
     vec3 sum = vec3(0.0);
     for (int c = 0; c < SH_COUNT; ++c) {
-        sum += texelFetch(lpv_source, ivec3(at.xy, z + c * grid_size.z), 0).rgb * y[c];
+        ivec3 texel = ivec3(at.xy, z + c * grid_size.z);
+#if HAS_LPV_BOUNCED
+        vec3 value = bounced == 1 ? imageLoad(lpv_bounced, texel).rgb : texelFetch(lpv_source, texel, 0).rgb;
+#else
+        vec3 value = texelFetch(lpv_source, texel, 0).rgb;
+#endif
+        sum += value * y[c];
     }
     imageStore(lpv_radiance, at, vec4(sum, 0.0));
 }

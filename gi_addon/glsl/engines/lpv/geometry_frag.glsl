@@ -18,7 +18,9 @@ void main()
 #if SURFACE_FULL
     vec3 along = vec3(0.0);
     along[axis] = 1.0;
-    if (!surface_is_there(surface_opacity(surface_closure(surface_point(along))), 2u)) {
+    Closure c = surface_closure(surface_point(along));
+    float opacity = surface_opacity(c);
+    if (!surface_is_there(opacity, 2u)) {
         discard;
     }
 #endif
@@ -41,4 +43,14 @@ void main()
     uvec2 units = uvec2((across + 1.0) * 127.5 + 0.5);
     atomicAdd(lpv_faces[face + 3], units.x);
     atomicAdd(lpv_faces[face + 4], units.y);
+#if HAS_LPV_ALBEDO
+    vec3 albedo = c.diffuse;
+#if SURFACE_TABLES > 0
+    albedo += lobe_albedo_average(brdf_average, brdf_energy, closure_lobe(c));
+#endif
+    vec3 share = saturate(albedo / max(opacity, 1e-4)) / max(dot(abs(ng), vec3(1.0)), 1.0);
+    for (int k = 0; k < 3; ++k) {
+        atomicAdd(lpv_albedo[face / WORDS * 3 + k], uint(share[k] * 255.0 + 0.5));
+    }
+#endif
 }
