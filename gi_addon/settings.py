@@ -134,6 +134,10 @@ class LPVSettings:
         "48", "Directions", "Directions that light travels in through the grid",
         choices=(("48", "48", "Faster; small bright patches may show as rays"), ("72", "72", "Smoother")),
     )  # fmt: skip
+    glossy_rays: int = _setting(
+        2, "Glossy Rays", "Rays through the grid per pixel and sub-frame for glossy reflections", low=1, high=64,
+        higher="less noise on rough surfaces", lower="faster",
+    )  # fmt: skip
     occlusion: bool = _setting(True, "Occlusion", "Objects stop light on its way through the grid")
 
 

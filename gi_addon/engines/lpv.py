@@ -18,7 +18,6 @@ from ..facts import Facts
 from ..frame import Frame
 from ..gpu_types import LIGHT_AREA, LIGHT_SUN, LIGHT_WORLD
 from ..graph import Buffer, Optional, Pass, Planned, Texture, Uniform
-from ..passes.ao import AOBlur, AOGeneration
 from ..passes.brdf_tables import BRDFTables
 from ..passes.direct_lighting import DirectLighting
 from ..passes.gbuffer import GBuffer, TranslucentTint, _screen
@@ -54,9 +53,9 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         TranslucentTint(),
         GeometryInjection(),
         Propagation(settings.bounces),
-        AOGeneration(),
-        AOBlur(),
+        AmbientOcclusion(),
         IndirectLighting(),
+        GlossyLighting(),
         DirectLighting(),
         Resolve(layers),
     ]
@@ -390,4 +389,68 @@ class IndirectLighting(Pass):
     def run(self, frame: Frame, planned: Planned) -> None:
         program = frame.program(planned)
         _set_grid(frame, program, planned.facts)
+        frame.screen(planned, program)
+
+
+def _march_steps(facts: Facts) -> int:
+    """Faces that a ray through the grid can pass."""
+    return int(sum(grid(facts).size))
+
+
+class AmbientOcclusion(Pass):
+    """Rays through the geometry volume."""
+
+    title = "LPV AO Computation"
+    figure = "AO Generation"
+    reads = ("lpv.walls", "gbuffer.depth", "gbuffer.normal")
+    writes = (
+        Texture("ao", "ao", "cosine-weighted share of directions free of occluders within the AO distance; 1", "rg16f",
+                _screen),
+    )  # fmt: skip
+    uniforms = (
+        *_GRID,
+        Uniform("ao_directions", "int", "rays per pixel"),
+        Uniform("ao_distance", "float", "how far an occluder counts, m"),
+    )
+    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/lpv/ao_frag.glsl"}}
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return {"MARCH_STEPS": _march_steps(facts), "MARCH_LIGHT": 0, "HAS_LPV_WALLS": 1}
+
+    def absent(self, facts: Facts) -> str | None:
+        return None if facts.settings.use_ao else "ambient occlusion is switched off"
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        program = frame.program(planned)
+        ao = planned.facts.settings.ao
+        _set_grid(frame, program, planned.facts, ao_directions=ao.samples, ao_distance=planned.facts.ao_distance)
+        frame.screen(planned, program)
+
+
+class GlossyLighting(Pass):
+    """Rays of the glossy lobe through the volume."""
+
+    title = "LPV Glossy Computation"
+    figure = "LPV Lighting Computation"
+    reads = (
+        "lpv.volume", "lpv.walls", "gbuffer.depth", "gbuffer.normal", "gbuffer.specular", "gbuffer.lobe", "brdf.energy",
+        "brdf.average",
+    )  # fmt: skip
+    writes = (
+        Texture("indirect.glossy", "indirect_glossy", "radiance that the glossy lobe reflects, W/(m²·sr)", "rgba32f", _screen),
+    )
+    uniforms = (*_GRID, Uniform("glossy_rays", "int", "rays per pixel"))
+    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/lpv/glossy_frag.glsl"}}
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return {"MARCH_STEPS": _march_steps(facts), "MARCH_LIGHT": 1, "HAS_LPV_WALLS": 1}
+
+    def absent(self, facts: Facts) -> str | None:
+        if not facts.settings.use_glossy:
+            return "glossy reflections are switched off"
+        return None if facts.glossy else "no visible material is glossy"
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        program = frame.program(planned)
+        _set_grid(frame, program, planned.facts, glossy_rays=planned.facts.settings.lpv.glossy_rays)
         frame.screen(planned, program)
