@@ -18,6 +18,7 @@ from ..facts import Facts
 from ..frame import Frame
 from ..gpu_types import LIGHT_AREA, LIGHT_SUN, LIGHT_WORLD
 from ..graph import Buffer, Optional, Pass, Planned, Texture, Uniform
+from ..passes.ao import AOBlur
 from ..passes.brdf_tables import BRDFTables
 from ..passes.direct_lighting import DirectLighting
 from ..passes.gbuffer import GBuffer, TranslucentTint, _screen
@@ -54,6 +55,7 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         GeometryInjection(),
         Propagation(settings.bounces),
         AmbientOcclusion(),
+        AOBlur(),
         IndirectLighting(),
         GlossyLighting(),
         DirectLighting(),
@@ -400,12 +402,12 @@ def _march_steps(facts: Facts) -> int:
 class AmbientOcclusion(Pass):
     """Rays through the geometry volume."""
 
-    title = "LPV AO Computation"
+    title = "LPV AO Generation"
     figure = "AO Generation"
     reads = ("lpv.walls", "gbuffer.depth", "gbuffer.normal")
     writes = (
-        Texture("ao", "ao", "cosine-weighted share of directions free of occluders within the AO distance; 1", "rg16f",
-                _screen),
+        Texture("ao.raw", "ao_raw", "cosine-weighted share of directions free of occluders within the AO distance; 1",
+                "rg16f", _screen, scratch=True),
     )  # fmt: skip
     uniforms = (
         *_GRID,

@@ -13,13 +13,14 @@ void main()
     vec2 uv = gl_FragCoord.xy * view.inverse_resolution;
     float depth = texelFetch(gbuf_depth, pixel, 0).r;
     if (depth <= 0.0) {
-        ao = vec2(0.0); // Cycles' pass is black where nothing is
+        ao_raw = vec2(0.0); // Cycles' pass is black where nothing is
         return;
     }
     vec4 normals = texelFetch(gbuf_normal, pixel, 0);
     vec3 ng = octahedral_decode(normals.zw);
     mat3 frame = frame_from_normal(octahedral_decode(normals.xy));
     vec3 from = (position_ws_from_depth(uv, depth) - grid_origin) / grid_cell + ng * half_cell_shift(ng);
+    // 16 rotations over 4 × 4 pixels, which the blur evens out.
     ivec2 block = (pixel + view.pixel_offset) & 3;
     float turn = float(block.y * 4 + block.x) / 16.0;
     float sum = 0.0;
@@ -28,5 +29,5 @@ void main()
         vec3 direction = frame * warp_cosine_hemisphere(u);
         sum += dot(direction, ng) > 0.0 ? march_walls(from, direction, ao_distance / grid_cell).open_share : 0.0;
     }
-    ao = vec2(sum / float(ao_directions), 1.0);
+    ao_raw = vec2(sum / float(ao_directions), 1.0);
 }

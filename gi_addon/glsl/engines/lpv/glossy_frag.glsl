@@ -35,12 +35,12 @@ void main()
     v_local.z = max(v_local.z, 1e-4); // shading normals can face away from the eye
     float alpha = max(sqr(lobe.roughness), ALPHA_MIN);
     vec3 from = (position_ws - grid_origin) / grid_cell + ng * half_cell_shift(ng);
-    // Another point of the sequence in each of 4 × 4 pixels: neighbours' noise evens out.
-    ivec2 block = (pixel + view.pixel_offset) & 3;
-    float turn = float(block.y * 4 + block.x) / 16.0;
+    // Each pixel turns the sequence by its own number (R. Cranley and T. Patterson, 1976).
+    uint seed = hash_u32(uvec2(pixel + view.pixel_offset));
+    vec2 turn = vec2(unit_float(seed), unit_float(hash_u32(seed)));
     vec3 sum = vec3(0.0);
     for (int i = 0; i < glossy_rays; ++i) {
-        vec2 u = fract(sobol_2d(view.subframe * uint(glossy_rays) + uint(i), 40u) + vec2(turn, turn * 7.0)); // 7: prime to 16
+        vec2 u = fract(sobol_2d(view.subframe * uint(glossy_rays) + uint(i), 40u) + turn);
         vec3 h = ggx_sample_visible_normal(v_local, alpha, u);
         vec3 l_local = reflect(-v_local, h);
         vec3 l = frame * l_local;
