@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The command line: ``quartet render|compare|inspect|snapshot …``."""
+"""The command line: ``quartet render|compare|bench|stability|inspect|snapshot …``."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from . import __version__
+from .cli_measure import bench_command, stability_command
 from .gl import GLError
 from .outputs import OUTPUTS
 from .renderer import RenderError, inspect, render
@@ -322,6 +323,10 @@ def _progress(title: str) -> Iterator:
 def _notes(notes) -> None:
     for note in notes:
         console.print(f"note: {note}", style="yellow", highlight=False)
+
+
+main.add_command(bench_command)
+main.add_command(stability_command)
 
 
 if __name__ == "__main__":

@@ -298,7 +298,7 @@ class GPUScene:
         with_material = compiled is not None
         glsl = compiled.glsl if compiled else ""
         object_space = any(
-            word in glsl for word in ("_os", "generated", "object_", "point.object", "world_from_object")
+            word in glsl for word in ("_os", "generated", "object_", "point.object", "world_from_object", "map_object", "tangent_radial")
         )  # fmt: skip
         defines = {
             **planned.defines(),
@@ -471,7 +471,7 @@ def material_source(compiled: CompiledGraph, units: int) -> str:
         else:
             lines.append(f"const vec4 attribute_value_{slot} = vec4(0.0);")
     lines += ['#include "nodes/closures.glsl"', '#include "nodes/math.glsl"', '#include "nodes/color.glsl"',
-              '#include "nodes/texture.glsl"', '#include "nodes/normal.glsl"', compiled.glsl]  # fmt: skip
+              '#include "nodes/texture.glsl"', '#include "nodes/normal.glsl"', *_includes(compiled), compiled.glsl]  # fmt: skip
     return "\n".join(lines)
 
 
@@ -480,8 +480,13 @@ def world_source(compiled: CompiledGraph, units: int) -> str:
     lines = ["#define SURFACE_IMPLICIT_LOD 0", *_param_lines(compiled)]  # worlds are evaluated in compute shaders
     lines += _image_lines(compiled, units)
     lines += ['#include "lib/surface_lib.glsl"', '#include "nodes/math.glsl"', '#include "nodes/color.glsl"',
-              '#include "nodes/texture.glsl"', compiled.glsl]  # fmt: skip
+              '#include "nodes/texture.glsl"', *_includes(compiled), compiled.glsl]  # fmt: skip
     return "\n".join(lines)
+
+
+def _includes(compiled: CompiledGraph) -> list[str]:
+    macros = [f"#define {name} {value}" for name, value in sorted(compiled.macros.items())]
+    return macros + [f'#include "{path}"' for path in compiled.includes]
 
 
 def _param_block(compiled: CompiledGraph) -> bytes:

@@ -293,10 +293,9 @@ class LightRig:
         # The rest of the number that chose the triangle is as good as new.
         first = np.sqrt((u[0] - low) / max(cdf[index] - low, 1e-12))
         a, b, c = self.emitters.corners[index]
-        out["position_ws"] = out["center_ws"] = a * (1.0 - first) + b * first * (1.0 - u[1]) + c * first * u[1]
-        normal = _unit(np.cross(b - a, c - a))
-        frame = _frame(normal)
-        out["axis_ws"], out["u_ws"], out["v_ws"] = normal, frame[0], frame[1]
+        out["position_ws"] = a * (1.0 - first) + b * first * (1.0 - u[1]) + c * first * u[1]
+        # The triangle itself: what it lights from behind it also hides.
+        out["axis_ws"], out["center_ws"], out["u_ws"], out["v_ws"] = _unit(np.cross(b - a, c - a)), a, b - a, c - a
         area = 0.5 * np.linalg.norm(np.cross(b - a, c - a))
         share = area / (self.emitters.share[index] * source.count)
         out["emission"] = self.emitters.radiance[index] * share

@@ -64,31 +64,32 @@ LONG_NAMES = {o.short: o.name for o in OUTPUTS.values()}
 #   gbuffer.transmission                  tint of the refracting surfaces in front; 1 where there is none
 #   transmission.indirect                 radiance that arrives through them, tinted, where the technique knows it (alpha 1);
 #                                         elsewhere they show what is straight behind
-#   volume.light                          radiance scattered towards the eye in front of the surface; alpha: the share
+#   volume.light                          radiance scattered towards the eye in front of the surface; alpha: the mean share
 #                                         of the light behind that still passes
+#   volume.transmittance                  that share by colour, where the technique knows it
 LAYERS: dict[str, tuple[str, ...]] = {
     "combined": (
         "gbuffer.depth", "gbuffer.diffuse", "gbuffer.emission", "direct.diffuse", "direct.glossy", "indirect.diffuse",
-        "indirect.glossy", "gbuffer.transmission", "transmission.indirect", "volume.light",
+        "indirect.glossy", "gbuffer.transmission", "transmission.indirect", "volume.light", "volume.transmittance",
     ),
     "depth": ("gbuffer.depth",),
     "normal": ("gbuffer.depth", "gbuffer.normal"),
-    "diffuse_direct": ("gbuffer.depth", "gbuffer.diffuse", "direct.diffuse"),
-    "diffuse_indirect": ("gbuffer.depth", "gbuffer.diffuse", "indirect.diffuse"),
-    "diffuse_color": ("gbuffer.depth", "gbuffer.diffuse"),
-    "glossy_direct": ("gbuffer.depth", "direct.glossy"),
-    "glossy_indirect": ("gbuffer.depth", "indirect.glossy"),
+    "diffuse_direct": ("gbuffer.depth", "gbuffer.diffuse", "direct.diffuse", "volume.transmittance"),
+    "diffuse_indirect": ("gbuffer.depth", "gbuffer.diffuse", "indirect.diffuse", "volume.transmittance"),
+    "diffuse_color": ("gbuffer.depth", "gbuffer.diffuse", "volume.transmittance"),
+    "glossy_direct": ("gbuffer.depth", "direct.glossy", "volume.transmittance"),
+    "glossy_indirect": ("gbuffer.depth", "indirect.glossy", "volume.transmittance"),
     "glossy_color": ("gbuffer.depth", "gbuffer.normal", "gbuffer.specular", "gbuffer.lobe", "brdf.albedo",
-                     "brdf.average", "brdf.energy"),
+                     "brdf.average", "brdf.energy", "volume.transmittance"),
     "transmission_direct": ("gbuffer.depth", "gbuffer.transmission", "gbuffer.diffuse", "gbuffer.emission",
-                            "direct.diffuse", "direct.glossy"),
+                            "direct.diffuse", "direct.glossy", "volume.transmittance"),
     "transmission_indirect": ("gbuffer.depth", "gbuffer.transmission", "gbuffer.diffuse", "gbuffer.emission",
                               "direct.diffuse", "direct.glossy", "indirect.diffuse", "indirect.glossy",
-                              "transmission.indirect"),
-    "transmission_color": ("gbuffer.depth", "gbuffer.transmission"),
+                              "transmission.indirect", "volume.transmittance"),
+    "transmission_color": ("gbuffer.depth", "gbuffer.transmission", "volume.transmittance"),
     "volume_direct": ("volume.light",),
-    "emission": ("gbuffer.depth", "gbuffer.emission"),
-    "environment": ("gbuffer.depth",),
+    "emission": ("gbuffer.depth", "gbuffer.emission", "volume.transmittance"),
+    "environment": ("gbuffer.depth", "volume.transmittance"),
     "ao": ("gbuffer.depth", "ao"),
     "shadow": ("gbuffer.depth", "direct.shadow"),
 }  # fmt: skip

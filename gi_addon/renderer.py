@@ -17,7 +17,7 @@ import numpy as np
 from .engines import TECHNIQUES
 from .facts import Facts, gather_facts
 from .frame import Frame, ResourcePool
-from .gl import GL, CancelToken, GLThread, shared
+from .gl import GL, Cancelled, CancelToken, GLThread, shared
 from .gl.timers import PassTimers
 from .gpu_scene import GPUScene, world_source
 from .gpu_types import GENERATED, VIEW
@@ -151,12 +151,20 @@ class Renderer:
         ]:
             planned.programs = dict(old.programs)
 
-    def subframe(self, index: int) -> None:
-        """Render sub-frame ``index`` into the film. Static passes run if what they depend on has changed."""
+    def subframe(self, index: int, cancel: CancelToken | None = None) -> None:
+        """Render sub-frame ``index`` into the film. Static passes run if what they depend on has changed.
+
+        Raises Cancelled between two passes if ``cancel`` is set; the film then needs :meth:`begin` and sub-frame 0.
+        """
         frame = self.frame
         frame.begin_subframe(index)
         rerun: set[str] = set()
-        for planned in self._plan.run:
+        for position, planned in enumerate(self._plan.run):
+            if cancel is not None and cancel.cancelled:
+                # What would have read the maps made so far has not: it must run next time, whatever its key says.
+                for missed in self._plan.run[position:]:
+                    self._static.pop(missed.title, None)
+                raise Cancelled
             task, facts = planned.task, frame.facts
             planned.facts = facts
             key = (

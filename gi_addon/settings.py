@@ -109,6 +109,24 @@ class WorldSettings:
 
 
 @dataclass
+class VolumeSettings:
+    """Light scattered in the air."""
+
+    samples: int = _setting(
+        8, "Samples", "Points of a pixel's ray that are tested for each light, per sub-frame", low=1, high=256,
+        higher="less noise in shafts of light", lower="faster",
+    )  # fmt: skip
+    density: float = _setting(
+        0.0, "Haze", "Share of light scattered per metre by a haze that fills the scene's bounds, where the world has no "
+        "volume of its own", low=0.0, high=1e3, soft_high=1.0, unit="1/m", higher="thicker", lower="0 is clear air",
+    )  # fmt: skip
+    anisotropy: float = _setting(
+        0.0, "Haze Anisotropy", "Mean cosine of the angle that the haze scatters by", low=-0.99, high=0.99,
+        higher="glows around lights", lower="negative: scatters back",
+    )  # fmt: skip
+
+
+@dataclass
 class RSMSettings:
     """Reflective shadow maps (Dachsbacher and Stamminger 2005)."""
 
@@ -119,6 +137,15 @@ class RSMSettings:
     samples: int = _setting(
         200, "Samples", "Virtual point lights gathered per pixel and sub-frame", low=1, high=4096,
         higher="less blotchy near surfaces", lower="faster",
+    )  # fmt: skip
+    visibility: str = _setting(
+        "CELLS", "Visibility", "Whether virtual lights are blocked by objects",
+        choices=(("NONE", "None", "They shine through everything, as in 2005; near contacts are dimmed by ambient occlusion"),
+                 ("CELLS", "Cells", "Rays to them are tested in a grid of the cells that surfaces pass through")),
+    )  # fmt: skip
+    visibility_resolution: int = _setting(
+        128, "Visibility Resolution", "Cells along the scene's longest side", low=16, high=512,
+        higher="finer shadows in indirect light", lower="faster",
     )  # fmt: skip
 
 
@@ -181,6 +208,7 @@ class Settings:
     shadows: ShadowSettings = _group(ShadowSettings)
     ao: AOSettings = _group(AOSettings)
     world: WorldSettings = _group(WorldSettings)
+    volume: VolumeSettings = _group(VolumeSettings)
     rsm: RSMSettings = _group(RSMSettings)
     lpv: LPVSettings = _group(LPVSettings)
 

@@ -27,6 +27,80 @@ def report(**values):
 import bpy
 """
 
+# A window's script is a generator called ``steps``: it yields how many seconds Blender's own loop shall run meanwhile, or
+# a function to wait for.
+_WINDOW = """
+import os, subprocess, time
+def shot(path):
+    subprocess.run(["import", "-window", "root", path], check=True)
+def view():
+    area = next(a for a in bpy.context.window_manager.windows[0].screen.areas if a.type == "VIEW_3D")
+    return area, area.spaces.active, next(r for r in area.regions if r.type == "WINDOW")
+def studio():
+    # A red and a white box on a floor under a spot, in the default file; the camera looks at them.
+    from mathutils import Vector
+    scene = bpy.context.scene
+    for o in list(bpy.data.objects):
+        bpy.data.objects.remove(o)
+    def box(name, size, location, color):
+        bpy.ops.mesh.primitive_cube_add(size=1.0, location=location)
+        o = bpy.context.object
+        o.name, o.scale = name, size
+        o.data.materials.append(bpy.data.materials.new(name))
+        from gi_addon.host.compat import node_tree
+        node = node_tree(o.data.materials[0]).nodes["Principled BSDF"]
+        node.inputs["Base Color"].default_value = (*color, 1.0)
+        node.inputs["Roughness"].default_value = 1.0
+        return o
+    box("Floor", (8.0, 8.0, 0.2), (0.0, 0.0, -0.1), (0.7, 0.7, 0.7))
+    box("Red", (1.0, 1.0, 2.0), (-1.0, 0.0, 1.0), (0.8, 0.05, 0.05))
+    box("White", (1.0, 1.0, 1.0), (0.6, 0.3, 0.5), (0.8, 0.8, 0.8))
+    light = bpy.data.objects.new("Spot", bpy.data.lights.new("Spot", "SPOT"))
+    light.data.energy, light.data.spot_size, light.location = 800.0, 1.4, (3.0, -2.0, 5.0)
+    light.rotation_euler = (Vector((0, 0, 0)) - light.location).to_track_quat("-Z", "Y").to_euler()
+    scene.collection.objects.link(light)
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.location = (2.5, -6.0, 3.0)
+    camera.rotation_euler = (Vector((0, 0, 0.6)) - camera.location).to_track_quat("-Z", "Y").to_euler()
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    scene.world = bpy.data.worlds.new("Grey")
+    node_tree = __import__("gi_addon.host.compat", fromlist=["x"]).node_tree
+    node_tree(scene.world).nodes["Background"].inputs["Color"].default_value = (0.05, 0.05, 0.06, 1.0)
+    scene.render.engine = "QUARTET"
+    scene.quartet.viewport_samples = 4
+    bpy.context.view_layer.update()
+    return scene
+def settled():
+    from gi_addon.host import viewport
+    return bool(viewport.viewports()) and all(
+        v._picture is not None and v._request is not None and not v._dirty and v._picture.request.key == v._request.key
+        and not v._due() and v._job is None and v._picture.request.scale == 1 for v in viewport.viewports())
+class _Driver:
+    def __init__(self):
+        self.steps, self.wait, self.until = steps(), None, 0.0
+    def __call__(self):
+        try:
+            if self.wait is not None and not self.wait():
+                if time.monotonic() > self.until:
+                    raise TimeoutError("waited in vain for " + getattr(self.wait, "__name__", "something"))
+                return 0.02
+            self.wait = None
+            order = next(self.steps)
+            if callable(order):
+                self.wait, self.until = order, time.monotonic() + {patience}
+                return 0.02
+            return order
+        except StopIteration:
+            pass
+        except BaseException:
+            report(error=traceback.format_exc())
+        sys.stdout.flush()
+        os._exit(0)
+bpy.context.preferences.view.show_splash = False
+bpy.app.timers.register(_Driver(), first_interval=1.0, persistent=True)
+"""
+
 
 def available() -> str | None:
     """Why the real Blender can't be driven here, or None."""
@@ -77,10 +151,22 @@ def run(script: str, tmp_path: Path, *options: str, timeout: int = 600) -> dict:
     code = _PREAMBLE.format(paths=paths, report=str(answer)) + script
     path = tmp_path / "script.py"
     path.write_text(code)
+    # That program has another Mesa than this machine: two of them in one shader cache end in a bus error now and then.
+    cache = CACHE / "mesa"
+    cache.mkdir(parents=True, exist_ok=True)
     done = subprocess.run(
         [str(TOOL), *options, "--factory-startup", "--python-exit-code", "1", "-P", str(path)],
-        capture_output=True, text=True, timeout=timeout,
+        capture_output=True, text=True, timeout=timeout, env={**os.environ, "MESA_SHADER_CACHE_DIR": str(cache)},
     )  # fmt: skip
     if not answer.exists():
         pytest.fail(f"Blender gave no report (exit {done.returncode}):\n{done.stdout[-4000:]}\n{done.stderr[-4000:]}")
     return json.loads(answer.read_text())
+
+
+def run_window(steps: str, tmp_path: Path, *options: str, size: str = "1000x700", timeout: int = 300) -> dict:
+    """Run the generator ``steps()`` in a window of the real Blender; see ``_WINDOW`` for what it has at hand."""
+    code = "import gi_addon\ngi_addon.register()\n" + steps + _WINDOW.replace("{patience}", "90")
+    answer = run(code, tmp_path, "--window", size, *options, timeout=timeout)
+    if "error" in answer:
+        pytest.fail(answer["error"])
+    return answer

@@ -15,14 +15,16 @@ from gi_addon.settings import SettingError, Settings, markdown, walk
 # A value unlike the default for every setting, so that a new one without an entry fails here.
 OTHER = {
     "technique": None, "use_indirect_diffuse": False, "use_glossy": None, "use_shadows": False, "use_ao": False,
-    "use_translucency": False, "use_volumetric": None, "use_area_lights": False, "samples": 3,
+    "use_translucency": False, "use_volumetric": False, "use_area_lights": False, "samples": 3,
     "viewport_samples": None, "bounces": 0, "pixel_filter": "BLACKMAN_HARRIS", "filter_width": 3.0,
     "shadows.resolution": 64, "shadows.softness": 6.0, "ao.samples": 1, "ao.steps": 1, "ao.distance": 0.3,
-    "ao.contact": 0.5, "world.samples": 1, "world.resolution": 64, "rsm.resolution": 32, "rsm.samples": 7,
+    "ao.contact": 0.005, "world.samples": 1, "world.resolution": 64, "rsm.resolution": 32, "rsm.samples": 7,
+    "volume.samples": 2, "volume.density": 0.2, "volume.anisotropy": 0.5, "rsm.visibility": "NONE",
+    "rsm.visibility_resolution": 32,
     "gather_scale": 1,
 }  # fmt: skip
 # Not read by the picture itself: the viewport's own number of sub-frames; and effects whose techniques have yet to land.
-ELSEWHERE = {"viewport_samples", "technique", "use_glossy", "use_volumetric"}
+ELSEWHERE = {"viewport_samples", "technique", "use_glossy"}
 
 
 @functools.cache
@@ -37,9 +39,17 @@ def scene():
     return s
 
 
+# Settings that only tell in haze, which the scene has none of by itself.
+IN_HAZE = {"use_volumetric", "volume.samples", "volume.anisotropy"}
+
+
 @functools.cache
-def default_picture():
-    return make(scene(), "Combined", "Ambient Occlusion", samples=2)
+def picture(path="", **settings):
+    """The scene with the setting ``path`` at its other value."""
+    chosen = {"samples": 2, **settings}
+    if path:
+        chosen[path.replace(".", "__")] = OTHER[path]
+    return make(scene(), "Combined", "Ambient Occlusion", **chosen)
 
 
 @pytest.mark.parametrize("path", [p for p, _, _ in walk()])
@@ -47,8 +57,8 @@ def test_every_setting_changes_the_picture_or_the_plan(gl, path):
     if path in ELSEWHERE:
         assert OTHER[path] is None
         return
-    result = make(scene(), "Combined", "Ambient Occlusion", **{"samples": 2, path.replace(".", "__"): OTHER[path]})
-    base = default_picture()
+    haze = {"volume__density": 0.1} if path in IN_HAZE else {}
+    result, base = picture(path, **haze), picture(**haze)
     changed = any(not np.array_equal(result.passes[n], base.passes[n]) for n in base.passes)
     assert changed or result.plan.text() != base.plan.text()
 

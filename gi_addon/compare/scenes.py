@@ -7,6 +7,7 @@ They are plain Scenes; ``host/build.py`` puts the same scenes into Blender, so t
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -292,6 +293,107 @@ def plane_scene(light: Light, *, size: float = 8.0, material: Material | None = 
     b.quads(np.array([[[-h, -h, 0], [h, -h, 0], [h, h, 0], [-h, h, 0]]]), material or diffuse((0.8,) * 3))
     b.light(light)
     return b.build(perspective((0, -7, 4), (0, 0, 0), 0.9))
+
+
+def corner(*, size: float = 2.0, depth: float = 1.0, height: float = 1.0, albedo: float = 0.8, strength: float = 5.0) -> Scene:
+    """A lit floor against a dark wall at 90°: the sun runs along the wall, so only the floor's bounce lights it. Floor
+    x ∈ ±size/2, y ∈ 0 … depth; wall at y = 0, z ∈ 0 … height."""
+    b = SceneBuilder("corner")
+    h = size / 2.0
+    b.quads(np.array([[[-h, 0, 0], [h, 0, 0], [h, depth, 0], [-h, depth, 0]]]), diffuse((albedo,) * 3, "Floor"))
+    b.quads(np.array([[[-h, 0, 0], [-h, 0, height], [h, 0, height], [h, 0, 0]]]), diffuse((albedo,) * 3, "Wall"))
+    b.light(sun_light((0.0, 0.0, -1.0), strength))
+    return b.build(perspective((0.0, 3.0, 1.7), (0.0, 0.3, 0.35), 0.85))
+
+
+def sliding_plate(*, offset: float = 0.0, plate: float = 0.4, lift: float = 0.1) -> Scene:
+    """A lit square plate at x = ``offset`` above a black floor, before a wall that it lights: for motion. The box around
+    everything stays as it is while the plate moves."""
+    b = SceneBuilder("sliding-plate")
+    b.quads(np.array([[[-1, 0, 0], [1, 0, 0], [1, 1, 0], [-1, 1, 0]]]), diffuse((0.0,) * 3, "Floor"))
+    b.quads(np.array([[[-1, 0, 0], [-1, 0, 1], [1, 0, 1], [1, 0, 0]]]), diffuse((0.8,) * 3, "Wall"))
+    r = plate / 2.0
+    mesh = mesh_from_quads(np.array([[[-r, -r, 0], [r, -r, 0], [r, r, 0], [-r, r, 0]]]))
+    matrix = np.eye(4)
+    matrix[:3, 3] = (offset, 0.35, lift)
+    b.add(mesh, diffuse((0.8,) * 3, "Plate"), matrix)
+    b.light(sun_light((0.0, 0.0, -1.0), 5.0))
+    return b.build(perspective((0.0, 3.0, 1.7), (0.0, 0.3, 0.35), 0.85))
+
+
+def thin_wall(thickness: float, *, offset: float = 0.0, degrees: float = 0.0, height: float = 1.0) -> Scene:
+    """Two roofless rooms of 2 m × 2 m with a wall of ``thickness`` m between them, its middle at x = ``offset``; a lamp in
+    the left one. All walls are equally high and the lamp is below their top: every straight line from a surface of the
+    left room to the right room's floor crosses the wall, so after one bounce that floor is black. The camera looks down.
+    ``degrees`` turns everything about z."""
+    b = SceneBuilder("thin-wall")
+    white = diffuse((0.8,) * 3, "White")
+    box = box_quads((-2, -1, 0), (2, 1, height), inward=True)
+    b.quads(box[[0, 1, 2, 3, 4]], white)
+    half = thickness / 2.0
+    b.quads(box_quads((offset - half, -1, 0), (offset + half, 1, height))[[0, 1, 5]], white)
+    b.light(point_light((-1.0, 0.0, 0.6 * height), 50.0))
+    scene = b.build(orthographic((0, 0, 6), (0, 0, 0), 4.6, aspect=16 / 9))
+    angle = np.radians(degrees)
+    turn = np.eye(4)
+    turn[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+    return transformed(scene, turn)
+
+
+def furnace(*, albedo: float = 1.0, radius: float = 1.0, strength: float = 1.0) -> Scene:
+    """White furnace: a convex body in a uniform world. With albedo 1 it vanishes."""
+    b = SceneBuilder("furnace")
+    b.add(sphere(radius, 96, 48), diffuse((albedo,) * 3))
+    return b.build(perspective((0, -4.0 * radius, 0), (0, 0, 0), 0.65), world((strength,) * 3))
+
+
+def corridor(*, power: float = 60.0) -> Scene:
+    """Two rooms and a corridor: the lamp is behind the door of the room that the camera does not stand in. What arrives
+    here has bounced: leaks and missing bounces both show."""
+    b = SceneBuilder("corridor")
+    white, red, blue = diffuse(WHITE, "White"), diffuse(RED, "Red"), diffuse((0.1, 0.2, 0.6), "Blue")
+    sides = box_quads((-1, -3, 0), (1, 3, 2), inward=True)
+    b.quads(sides[[2, 3, 4, 5]], white)
+    b.quads(sides[[0]], red)
+    b.quads(sides[[1]], blue)
+    # A wall of 0.1 m across the corridor with a doorway of 0.8 × 1.6 m.
+    for low, high in (((-1, -0.05, 0), (-0.4, 0.05, 2)), ((0.4, -0.05, 0), (1, 0.05, 2)), ((-0.4, -0.05, 1.6), (0.4, 0.05, 2))):
+        b.quads(box_quads(low, high), white)
+    b.quads(box_quads((-0.7, -1.6, 0), (-0.3, -1.2, 0.7)), white)
+    b.light(spot_light((0.35, 2.2, 1.9), (0.0, 0.6, 0.0), power, size=1.6, blend=0.3))
+    return b.build(perspective((0.55, -2.8, 1.2), (-0.15, 0.0, 0.8), 1.1))
+
+
+def transformed(scene: Scene, matrix: np.ndarray) -> Scene:
+    """``scene`` moved, turned and scaled (uniformly) by ``matrix`` (4, 4), in place. Power goes with the square of the
+    scale, so that radiance stays; sun strength is that of a surface already."""
+    scale = float(np.cbrt(np.linalg.det(matrix[:3, :3])))
+    rigid = matrix.copy()
+    rigid[:3, :3] /= scale
+    inst = scene.instances
+    inst.matrix = matrix @ inst.matrix
+    for i, light in enumerate(scene.lights):
+        moved = rigid @ light.matrix
+        moved[:3, 3] = (matrix @ light.matrix)[:3, 3]
+        scene.lights[i] = replace(
+            light, matrix=moved, radius=light.radius * scale, size=tuple(scale * v for v in light.size),
+            emission=light.emission * (1.0 if light.kind == "SUN" else scale**2),
+        )  # fmt: skip
+    camera = scene.camera
+    if camera is not None:
+        pose = rigid @ camera.world_from_view
+        pose[:3, 3] = (matrix @ camera.world_from_view)[:3, 3]
+        near, far = camera.clip_start * scale, camera.clip_end * scale
+        projection = camera.clip_from_view.copy()
+        if camera.orthographic:
+            projection[0, 0], projection[1, 1] = projection[0, 0] / scale, projection[1, 1] / scale
+            projection[2] = [0, 0, -2 / (far - near), -(far + near) / (far - near)]
+        else:
+            projection[2] = [0, 0, -(far + near) / (far - near), -2 * far * near / (far - near)]
+        scene.camera = replace(camera, world_from_view=pose, clip_from_view=projection, clip_start=near, clip_end=far,
+                               aperture=camera.aperture * scale, focus=camera.focus * scale)  # fmt: skip
+    scene.world.ao_distance *= scale
+    return scene
 
 
 __all__ = [name for name in globals() if not name.startswith("_") and name not in ("annotations", "CAMERA", "np")]

@@ -10,14 +10,16 @@ from __future__ import annotations
 
 from ..facts import Facts
 from ..frame import Frame
-from ..gpu_types import VPL
+from ..gpu_types import LIGHT_MESH, VPL
 from ..graph import Buffer, Optional, Pass, Planned, Texture, Uniform
 from ..passes.ao import AOBlur, AOGeneration
 from ..passes.brdf_tables import BRDFTables
 from ..passes.direct_lighting import DirectLighting
 from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentTint, _screen, gather_size
 from ..passes.lights import LightList, RSMGeneration, ShadowMaps
+from ..passes.occupancy import CELL_UNIFORMS, Occupancy, set_cells
 from ..passes.resolve import Resolve
+from ..passes.volumetric import MEDIUM_UNIFORMS, Volumetric, medium_defines, set_medium
 from ..settings import Settings
 
 
@@ -30,6 +32,7 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         RSMGeneration(),
         RSMFlux(),
         RSMSamplingPattern(),
+        Occupancy(),
         GBuffer(),
         TranslucentTint(),
         GBufferMips(),
@@ -38,6 +41,7 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         InterpolatedIndirect(),
         IndirectLighting(),
         DirectLighting(),
+        Volumetric(),
         Resolve(layers),
     ]
 
@@ -46,6 +50,11 @@ def _bounce_off(facts: Facts) -> str | None:
     if not facts.settings.use_indirect_diffuse:
         return "indirect diffuse is switched off"
     return "bounces is 0" if facts.settings.bounces == 0 else None
+
+
+def _gather_defines(facts: Facts) -> dict[str, int]:
+    lamps = any(s.kind == LIGHT_MESH for s in facts.rig.sources)
+    return {"GATHER_SCALE": facts.settings.gather_scale, "MESH_LIGHTS": int(lamps), **medium_defines(facts)}
 
 
 class RSMFlux(Pass):
@@ -58,15 +67,19 @@ class RSMFlux(Pass):
                 lambda f: f.rig.bounce.size, mips=lambda f: max(f.rig.bounce.size).bit_length() - 1,
                 access="readwrite"),
     )  # fmt: skip
-    uniforms = (Uniform("tile", "int", "index of the view whose tile is filled"),)
+    uniforms = (Uniform("tile", "int", "index of the view whose tile is filled"), *MEDIUM_UNIFORMS)
     shaders = {
         "main": {"compute": "engines/rsm/flux_comp.glsl"},
         "reduce": {"compute": "engines/rsm/flux_reduce_comp.glsl"},
     }
     depends = ("lights", "world", "transforms", "meshes", "materials")
+    settings = ("use_volumetric", "volume.density")
 
     def rate(self, facts: Facts) -> str:
         return RSMGeneration().rate(facts)
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return medium_defines(facts)
 
     def absent(self, facts: Facts) -> str | None:
         return _bounce_off(facts)
@@ -76,6 +89,7 @@ class RSMFlux(Pass):
         maps = facts.rig.bounce
         flux = frame.resources["rsm.flux"]
         program = frame.program(planned)
+        set_medium(frame, program, facts)
         if planned.stale:
             # Texels outside every tile hold nothing.
             frame.pool.framebuffer([flux]).clear(0.0, 0.0, 0.0, 0.0)
@@ -110,13 +124,18 @@ class RSMSamplingPattern(Pass):
         Uniform("vpl_count", "int", "how many to draw"),
         Uniform("view_count", "int", "views in the list"),
         Uniform("levels", "int", "levels of the flux pyramid above the texels"),
+        *MEDIUM_UNIFORMS,
     )
     shaders = {"main": {"compute": "engines/rsm/vpls_comp.glsl"}}
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return medium_defines(facts)
 
     def run(self, frame: Frame, planned: Planned) -> None:
         program = frame.program(planned)
         facts = planned.facts
         count = facts.settings.rsm.samples
+        set_medium(frame, program, facts)
         frame.set(
             program,
             vpl_count=count,
@@ -131,18 +150,18 @@ class InterpolatedIndirect(Pass):
 
     title = "RSM Interpolated Indirect Lighting Computation"
     figure = "RSM Interpolated Indirect Lighting Computation"
-    reads = ("vpls", "gbuffer.low_depth", "gbuffer.low_normal", "gbuffer.low_pixel")
+    reads = ("vpls", "rsm.lights", Optional("occupancy"), "gbuffer.low_depth", "gbuffer.low_normal", "gbuffer.low_pixel")
     writes = (
         Texture("indirect.low", "low_indirect", "radiance a white Lambert surface would reflect, W/(m²·sr)", "rgba32f",
                 gather_size, scratch=True),
         Texture("indirect.low_direction", "low_direction", "Σ luminance × direction, and Σ luminance, of what arrives",
                 "rgba32f", gather_size, scratch=True),
     )  # fmt: skip
-    uniforms = (Uniform("vpl_count", "int", "virtual point lights in the list"),)
+    uniforms = (Uniform("vpl_count", "int", "virtual point lights in the list"), *CELL_UNIFORMS, *MEDIUM_UNIFORMS)
     shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/rsm/gather_low_frag.glsl"}}
 
     def defines(self, facts: Facts) -> dict[str, int]:
-        return {"GATHER_SCALE": facts.settings.gather_scale}
+        return _gather_defines(facts)
 
     def absent(self, facts: Facts) -> str | None:
         return None if facts.settings.gather_scale > 1 else "every pixel gathers for itself"
@@ -150,6 +169,8 @@ class InterpolatedIndirect(Pass):
     def run(self, frame: Frame, planned: Planned) -> None:
         program = frame.program(planned)
         frame.set(program, vpl_count=planned.facts.settings.rsm.samples)
+        set_cells(frame, program, planned.facts)
+        set_medium(frame, program, planned.facts)
         frame.screen(planned, program)
 
 
@@ -159,21 +180,23 @@ class IndirectLighting(Pass):
     title = "RSM Lighting Computation"
     figure = "RSM Lighting Computation"
     reads = (
-        "vpls", "gbuffer.depth", "gbuffer.normal", Optional("gbuffer.low_depth"), Optional("gbuffer.low_normal"),
-        Optional("gbuffer.low_pixel"), Optional("indirect.low"), Optional("indirect.low_direction"),
-        Optional("ao"),
+        "vpls", "rsm.lights", Optional("occupancy"), "gbuffer.depth", "gbuffer.normal", Optional("gbuffer.low_depth"),
+        Optional("gbuffer.low_normal"), Optional("gbuffer.low_pixel"), Optional("indirect.low"),
+        Optional("indirect.low_direction"), Optional("ao"),
     )  # fmt: skip
     writes = (
         Texture("indirect.diffuse", "indirect_diffuse", "radiance a white Lambert surface would reflect, W/(m²·sr)",
                 "rgba32f", _screen, when=lambda f: None if f.diffuse else "no visible material is diffuse"),
     )  # fmt: skip
-    uniforms = (Uniform("vpl_count", "int", "virtual point lights in the list"),)
+    uniforms = (Uniform("vpl_count", "int", "virtual point lights in the list"), *CELL_UNIFORMS, *MEDIUM_UNIFORMS)
     shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/rsm/lighting_frag.glsl"}}
 
     def defines(self, facts: Facts) -> dict[str, int]:
-        return {"GATHER_SCALE": facts.settings.gather_scale}
+        return _gather_defines(facts)
 
     def run(self, frame: Frame, planned: Planned) -> None:
         program = frame.program(planned)
         frame.set(program, vpl_count=planned.facts.settings.rsm.samples)
+        set_cells(frame, program, planned.facts)
+        set_medium(frame, program, planned.facts)
         frame.screen(planned, program)

@@ -18,7 +18,8 @@ _NODES = {
     "BSDF_TRANSLUCENT": "ShaderNodeBsdfTranslucent", "MIX_SHADER": "ShaderNodeMixShader",
     "ADD_SHADER": "ShaderNodeAddShader", "TEX_CHECKER": "ShaderNodeTexChecker", "RGB": "ShaderNodeRGB",
     "VALUE": "ShaderNodeValue", "TEX_COORD": "ShaderNodeTexCoord", "MAPPING": "ShaderNodeMapping",
-    "SUBSURFACE_SCATTERING": "ShaderNodeSubsurfaceScattering",
+    "SUBSURFACE_SCATTERING": "ShaderNodeSubsurfaceScattering", "VOLUME_SCATTER": "ShaderNodeVolumeScatter",
+    "VOLUME_ABSORPTION": "ShaderNodeVolumeAbsorption", "PRINCIPLED_VOLUME": "ShaderNodeVolumePrincipled",
 }  # fmt: skip
 
 
@@ -113,6 +114,9 @@ def _graph(tree: bpy.types.NodeTree, graph: ShaderGraph, output: str) -> None:
     if graph.surface is not None:
         outputs = {s.identifier: s for s in made[graph.surface.node].outputs}
         tree.links.new(outputs[graph.surface.output], end.inputs["Surface"])
+    if graph.volume is not None:
+        outputs = {s.identifier: s for s in made[graph.volume.node].outputs}
+        tree.links.new(outputs[graph.volume.output], end.inputs["Volume"])
 
 
 def _light(scene: bpy.types.Scene, light) -> None:

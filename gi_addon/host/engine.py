@@ -23,6 +23,7 @@ from ..settings import SettingError, Settings
 from . import properties
 from .compat import pass_name
 from .sync import SceneSync
+from .viewport import Viewport, close_all
 
 _POLL_SECONDS = 0.05
 # Told of every render's progress (0 … 1, text) and of its notes: the command line shows them.
@@ -58,6 +59,7 @@ class QuartetEngine(bpy.types.RenderEngine):
     _sync: SceneSync | None = None
     _renderer: Renderer | None = None
     _failure: str = ""
+    _viewport: Viewport | None = None
 
     # -- final render --------------------------------------------------------------------------------------------
 
@@ -172,6 +174,25 @@ class QuartetEngine(bpy.types.RenderEngine):
             with contextlib.suppress(GLError):  # the context is gone, and the memory with it
                 shared().call(lambda gl: renderer.close())
 
+    # -- viewport ------------------------------------------------------------------------------------------------
+
+    def view_update(self, context, depsgraph) -> None:
+        """Something has changed; view_draw follows."""
+        if self._viewport is None:
+            self._viewport = Viewport(self)
+        self._viewport.update(depsgraph)
+
+    def view_draw(self, context, depsgraph) -> None:
+        """Draw the viewport's picture."""
+        if self._viewport is None:
+            self._viewport = Viewport(self)
+        self._viewport.draw(context, depsgraph)
+
+    def __del__(self) -> None:
+        viewport = self._viewport
+        if viewport is not None:
+            viewport.close()
+
     # -- passes --------------------------------------------------------------------------------------------------
 
     def update_render_passes(self, scene=None, renderlayer=None) -> None:
@@ -228,4 +249,5 @@ def unregister() -> None:
         engines = getattr(panel, "COMPAT_ENGINES", None)
         if engines and "QUARTET" in engines:
             engines.discard("QUARTET")
+    close_all()
     bpy.utils.unregister_class(QuartetEngine)

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import os
+import tempfile
 from collections.abc import Iterator
 from typing import Any
 
@@ -35,10 +37,12 @@ _PARAMS: dict[str, tuple[str, ...]] = {
                 "sun_elevation", "sun_rotation", "altitude", "air_density", "dust_density", "aerosol_density",
                 "ozone_density"),
     "VECTOR_ROTATE": ("rotation_type", "invert"), "VECT_TRANSFORM": ("vector_type", "convert_from", "convert_to"),
-    "SUBSURFACE_SCATTERING": ("falloff",),
+    "SUBSURFACE_SCATTERING": ("falloff",), "TANGENT": ("direction_type", "axis", "uv_map"),
 }  # fmt: skip
 
-_CURVE_ENTRIES = 257  # rows of a sampled ramp or curve: Cycles samples them at 256
+_CURVE_ENTRIES = 256  # rows of a sampled ramp or curve, as many as Cycles takes
+_ATLAS_LIMIT = 8192  # texels a side of all tiles of an image together
+_PCG = bpy.app.version >= (5, 0, 0)  # how this Blender hashes Voronoi cells
 
 
 class ImageTable:
@@ -65,14 +69,11 @@ class ImageTable:
         cached = self._cache.get(key)
         if cached and cached[0] == stamp and not image.is_dirty and image.source != "SEQUENCE":
             return cached[1]
-        width, height = image.size
-        if width * height == 0 or image.channels == 0:
+        pixels = self._tiles(image) if image.source == "TILED" else self._pixels(image)
+        if pixels is None:
             where = bpy.path.abspath(image.filepath) or "no file"
             self._notes.append(f"image {image.name} of {owner} can't be read ({where}); it shows magenta")
             return Image.placeholder(image.name)
-        pixels = np.empty(width * height * 4, np.float32)
-        image.pixels.foreach_get(pixels)
-        pixels = pixels.reshape(height, width, 4)
         name = image.colorspace_settings.name
         space = "data" if name in _DATA else "srgb" if name in _SRGB else "linear"
         if not image.is_float:
@@ -85,6 +86,70 @@ class ImageTable:
         result = Image(image.name, pixels, space)
         self._cache[key] = (stamp, result)
         return result
+
+
+    @staticmethod
+    def _pixels(image: bpy.types.Image) -> np.ndarray | None:
+        """Pixels (H, W, 4) f4, None where there are none."""
+        width, height = image.size
+        if width * height == 0 or image.channels == 0:
+            return None
+        pixels = np.empty(width * height * 4, np.float32)
+        image.pixels.foreach_get(pixels)
+        return pixels.reshape(height, width, 4)
+
+    def _tiles(self, image: bpy.types.Image) -> np.ndarray | None:
+        """All UDIM tiles in one picture, laid out as in UV space; see :func:`tile_grid`. Blender shows scripts the first
+        tile alone, so the others are loaded from their files; a missing one is magenta."""
+        column, row, columns, rows = tile_grid(image)
+        parts = {tile.number: self._tile(image, tile) for tile in image.tiles}
+        sizes = [p.shape[:2] for p in parts.values() if p is not None]
+        if not sizes:
+            return None
+        height, width = np.max(sizes, axis=0)
+        step = max(1, -(-max(width * columns, height * rows) // _ATLAS_LIMIT))
+        height, width = -(-height // step), -(-width // step)
+        atlas = np.empty((rows * height, columns * width, 4), np.float32)
+        atlas[:] = (1.0, 0.0, 1.0, 1.0)
+        for number, part in parts.items():
+            if part is None:
+                self._notes.append(f"tile {number} of image {image.name} can't be read; it shows magenta")
+                continue
+            y, x = (np.arange(n) * m // n for n, m in zip((height, width), part.shape[:2], strict=True))
+            at_x, at_y = (number - 1001) % 10 - column, (number - 1001) // 10 - row
+            atlas[at_y * height : (at_y + 1) * height, at_x * width : (at_x + 1) * width] = part[np.ix_(y, x)]
+        return atlas
+
+    def _tile(self, image: bpy.types.Image, tile) -> np.ndarray | None:
+        if tile.number == image.tiles[0].number and image.size[0]:
+            return self._pixels(image)
+        x, y = (tile.number - 1001) % 10 + 1, (tile.number - 1001) // 10 + 1
+        path = bpy.path.abspath(image.filepath_raw, library=image.library)
+        path = path.replace("<UDIM>", str(tile.number)).replace("<UVTILE>", f"u{x}_v{y}")
+        with tempfile.TemporaryDirectory(prefix="quartet-") as folder:
+            packed = next((p for p in image.packed_files if p.tile_number == tile.number), None)
+            if packed is not None:
+                path = os.path.join(folder, os.path.basename(path))
+                with open(path, "wb") as file:
+                    file.write(packed.data)
+            if not os.path.isfile(path):
+                return None
+            try:
+                loaded = bpy.data.images.load(path)
+            except RuntimeError:
+                return None
+            try:
+                loaded.colorspace_settings.name = image.colorspace_settings.name
+                return self._pixels(loaded)
+            finally:
+                bpy.data.images.remove(loaded)
+
+
+def tile_grid(image: bpy.types.Image) -> tuple[int, int, int, int]:
+    """(first column, first row, columns, rows) that a tiled image's UDIM numbers span."""
+    at = [((tile.number - 1001) % 10, (tile.number - 1001) // 10) for tile in image.tiles]
+    low, high = np.min(at, axis=0), np.max(at, axis=0)
+    return (int(low[0]), int(low[1]), *(int(v) for v in high - low + 1))
 
 
 class GraphReader:
@@ -166,6 +231,8 @@ class GraphReader:
         if node.type in ("TEX_IMAGE", "TEX_ENVIRONMENT"):
             params["image"] = self.images.index(node.image, self.owner)
             if node.image is not None:
+                if node.image.source == "TILED":
+                    params["tiles"] = tile_grid(node.image)
                 params["alpha_mode"] = {"PREMUL": "PREMUL", "NONE": "NONE"}.get(node.image.alpha_mode, "STRAIGHT")
         if node.type == "RGB":
             params["value"] = tuple(node.outputs[0].default_value[:3])
@@ -174,7 +241,11 @@ class GraphReader:
         elif node.type == "NORMAL":
             params["normal"] = tuple(node.outputs[0].default_value)
         elif node.type == "TEX_COORD":
-            params["object"] = bool(node.object)
+            if node.object is not None:
+                matrix = node.object.matrix_world.inverted_safe()
+                params["object_matrix"] = [tuple(float(v) for v in matrix[r]) for r in range(3)]
+        elif node.type == "TEX_VORONOI":
+            params["pcg"] = _PCG
         elif node.type == "VALTORGB":
             ramp = node.color_ramp
             params["table"] = [tuple(ramp.evaluate(i / (_CURVE_ENTRIES - 1))) for i in range(_CURVE_ENTRIES)]
@@ -217,22 +288,19 @@ def _plain(value: Any, *, color: bool = False) -> Any:
 
 
 def _curves(node: bpy.types.Node) -> dict[str, Any]:
+    """Samples between the first and the last point of all curves; ``extend``: they go on straight beyond."""
     mapping = node.mapping
     mapping.initialize()
-    low, high = (mapping.clip_min_x, mapping.clip_max_x) if mapping.use_clip else (-1.0, 1.0)
-    if node.type != "CURVE_VEC" and mapping.use_clip is False:
-        low, high = 0.0, 1.0
-    xs = [low + (high - low) * i / (_CURVE_ENTRIES - 1) for i in range(_CURVE_ENTRIES)]
-    curves = mapping.curves
+    curves = mapping.curves[:1] if node.type == "CURVE_FLOAT" else mapping.curves[:]
+    low = min(curve.points[0].location[0] for curve in curves)
+    high = max(curve.points[-1].location[0] for curve in curves)
     rows = []
-    for x in xs:
-        if node.type == "CURVE_FLOAT":
-            rows.append((mapping.evaluate(curves[0], x), 0.0, 0.0, 0.0))
-        elif node.type == "CURVE_VEC":
-            rows.append((*(mapping.evaluate(curves[k], x) for k in range(3)), 0.0))
-        else:  # the combined curve comes first
-            rows.append((*(mapping.evaluate(curves[k], mapping.evaluate(curves[3], x)) for k in range(3)), 0.0))
-    return {"table": rows, "range": (low, high)}
+    for i in range(_CURVE_ENTRIES):
+        x = low + (high - low) * i / (_CURVE_ENTRIES - 1)
+        if node.type == "CURVE_RGB":  # the combined curve comes first
+            x = mapping.evaluate(curves[3], x)
+        rows.append(tuple(mapping.evaluate(curve, x) for curve in curves[:3]))
+    return {"table": rows, "range": (low, high), "extend": mapping.extend == "EXTRAPOLATED"}
 
 
 def _texture_mapping(mapping) -> list[tuple[float, ...]] | None:

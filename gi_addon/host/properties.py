@@ -49,11 +49,33 @@ def _make(cls: type, name: str) -> type:
     return made
 
 
+_window_class: list[type] = []
+
+
+def _make_window() -> type:
+    """What this session of Blender shows; saved in no file and no part of the picture."""
+    annotations = {
+        "measure": bpy.props.BoolProperty(
+            name="Measure Passes", default=False,
+            description="Time every pass of the viewport. On software OpenGL this costs a little speed",
+        ),
+    }  # fmt: skip
+    made = type("QuartetWindow", (bpy.types.PropertyGroup,), {"__annotations__": annotations})
+    bpy.utils.register_class(made)
+    _window_class.append(made)
+    return made
+
+
 def register() -> None:
     bpy.types.Scene.quartet = bpy.props.PointerProperty(type=_make(Settings, "QuartetSettings"), name="Quartet GI")
+    bpy.types.WindowManager.quartet = bpy.props.PointerProperty(
+        type=_make_window(), name="Quartet GI", options={"SKIP_SAVE"}
+    )
 
 
 def unregister() -> None:
+    del bpy.types.WindowManager.quartet
+    bpy.utils.unregister_class(_window_class.pop())
     del bpy.types.Scene.quartet
     for cls in reversed(_classes):
         bpy.utils.unregister_class(cls)

@@ -8,6 +8,7 @@ past the loop. Meshes, materials and images that did not change since the last s
 from __future__ import annotations
 
 import math
+from dataclasses import fields
 
 import bpy
 import numpy as np
@@ -47,7 +48,7 @@ class SceneSync:
         self._materials: dict[int, Material] = {}
         self._material_images: dict[int, list[tuple[int, Image]]] = {}
         self._images: dict[int, tuple[tuple, Image]] = {}
-        self._world: tuple[int, World] | None = None
+        self._world: tuple[World, list[Image]] | None = None
         self._default = default_material()
         self.counts: dict[str, int] = {}
 
@@ -55,28 +56,28 @@ class SceneSync:
         """Drop everything kept: after undo, file load, or when in doubt."""
         self.__init__()
 
-    def invalidate(self, depsgraph: bpy.types.Depsgraph) -> None:
-        """Drop what the depsgraph's updates say has changed."""
+    def invalidate(self, depsgraph: bpy.types.Depsgraph) -> bool:
+        """Drop what the depsgraph's updates say has changed. Whether anything has that a picture may show: selecting is
+        an update too, but one of nothing."""
+        changed = False
         for update in depsgraph.updates:
             data = update.id
-            uid = data.original.session_uid
             if isinstance(data, bpy.types.Object):
+                changed |= update.is_updated_geometry or update.is_updated_transform or update.is_updated_shading
                 if update.is_updated_geometry:
+                    uid = data.original.session_uid
                     self._meshes = {k: v for k, v in self._meshes.items() if k[0] != uid}
-            elif isinstance(data, bpy.types.Material):
-                self._materials.pop(uid, None)
-            elif isinstance(data, bpy.types.World):
-                self._world = None
-            elif isinstance(data, bpy.types.NodeTree):
-                # A shared node group: any material may use it.
-                self._materials.clear()
-                self._world = None
+            elif isinstance(data, (bpy.types.Mesh, bpy.types.Curve, bpy.types.MetaBall)):
+                changed = True
+                if update.is_updated_geometry:
+                    self._meshes = {k: v for k, v in self._meshes.items() if k[1] != data.name_full}
             elif isinstance(data, bpy.types.Image):
-                self._images.pop(uid, None)
-                self._materials.clear()
-                self._world = None
-            elif isinstance(data, bpy.types.Scene):
-                pass
+                changed = True
+                self._images.pop(data.original.session_uid, None)
+            else:
+                # Node trees are read again anyway and compared. A scene or collection may have lost or hidden objects.
+                changed = True
+        return changed
 
     def read(
         self,
@@ -85,9 +86,11 @@ class SceneSync:
         camera: Camera | None = None,
         resolution: tuple[int, int] | None = None,
         keep: bool = False,
+        space: bpy.types.SpaceView3D | None = None,
     ) -> Scene:
         """The Scene of ``depsgraph``. ``camera`` overrides the scene's own; ``resolution`` sets its aspect; with
-        ``keep`` meshes and materials of the last sync are trusted unless :meth:`invalidate` dropped them."""
+        ``keep`` meshes and materials of the last sync are trusted unless :meth:`invalidate` dropped them. ``space`` is a
+        3D view with a local view or collections of its own: only what it shows counts."""
         if not keep:
             self._meshes.clear()
             self._materials.clear()
@@ -104,6 +107,8 @@ class SceneSync:
         for instance in depsgraph.object_instances:
             obj = instance.object
             if not (instance.show_self or instance.is_instance):
+                continue
+            if space is not None and not _shown_in(instance, space):
                 continue
             if obj.type == "LIGHT":
                 light = _read_light(instance, obj, scene.notes)
@@ -124,17 +129,26 @@ class SceneSync:
             slots = [slot.material for slot in obj.material_slots] or list(getattr(obj.data, "materials", []))
             visibility = _visibility(obj)
             placed.add(index, matrix, tuple(materials.index(m) for m in slots) or (materials.index(None),),
-                       visibility, instance.random_id / 2**32, obj.pass_index, tuple(obj.color))  # fmt: skip
+                       visibility, _random(instance, obj), obj.pass_index, tuple(obj.color))  # fmt: skip
         self._meshes = {k: v for k, v in self._meshes.items() if k in used_keys}
         scene.instances = placed.instances()
-        if self._world is None:
-            self._world = (0, read_world(source.world, images))
-            self._material_images[0] = images.images[:]
-        world = self._world[1]
-        scene.world = world
+        scene.world = self._read_world(source, images)
         scene.images = images.images
         scene.camera = camera or _read_camera(source, depsgraph, resolution, scene.notes)
         return scene
+
+    def _read_world(self, source: bpy.types.Scene, images: ImageTable) -> World:
+        """The world; the same object as last time if it looks the same."""
+        world = read_world(source.world, images)
+        used = [images.images[n.params["image"]] for n in world.graph.nodes if n.params.get("image") is not None]
+        if self._world is not None:
+            old, old_images = self._world
+            if used == old_images and all(
+                getattr(old, f.name) == getattr(world, f.name) for f in fields(world) if f.name != "uid"
+            ):
+                return old
+        self._world = (world, used)
+        return world
 
     # -- meshes --------------------------------------------------------------------------------------------------
 
@@ -224,9 +238,39 @@ class _Placed:
                               color=color)  # fmt: skip
 
 
+def _shown_in(instance, space: bpy.types.SpaceView3D) -> bool:
+    """Whether a 3D view's local view and collections show an instance; its instancer decides for it."""
+    obj = instance.parent if instance.is_instance and instance.parent is not None else instance.object
+    return bool(obj.original.visible_in_viewport_get(space))
+
+
 def _note(scene: Scene, text: str) -> None:
     if text not in scene.notes:
         scene.notes.append(text)
+
+
+def _random(instance: bpy.types.DepsgraphObjectInstance, obj: bpy.types.Object) -> float:
+    """Object Info's Random in [0, 1]: Blender's own number for instances, for others Cycles' hash of the name."""
+    if instance.is_instance:
+        return instance.random_id / 0xFFFFFFFF
+    key = 0
+    for byte in obj.name.encode():
+        key = (key * 37 + byte) & 0xFFFFFFFF
+    return _lookup3(key, 0) / 0xFFFFFFFF
+
+
+def _lookup3(x: int, y: int) -> int:
+    """R. Jenkins' lookup3 of two 32-bit words, as in ``glsl/nodes/hash.glsl``."""
+    mask = 0xFFFFFFFF
+
+    def rotated(v: int, k: int) -> int:
+        return (v << k | v >> (32 - k)) & mask
+
+    c = 0xDEADBEEF + (2 << 2) + 13
+    v = [(c + x) & mask, (c + y) & mask, c & mask]
+    for target, source, k in ((2, 1, 14), (0, 2, 11), (1, 0, 25), (2, 1, 16), (0, 2, 4), (1, 0, 14), (2, 1, 24)):
+        v[target] = ((v[target] ^ v[source]) - rotated(v[source], k)) & mask
+    return v[2]
 
 
 def _visibility(obj: bpy.types.Object) -> int:
@@ -238,7 +282,8 @@ def _visibility(obj: bpy.types.Object) -> int:
 
 def _read_object_mesh(obj: bpy.types.Object, scene: Scene) -> Mesh | None:
     """The evaluated mesh of an object, whatever it is made from."""
-    if obj.type == "MESH":
+    # In edit mode the evaluated mesh is still the editor's, without arrays: to_mesh() makes them.
+    if obj.type == "MESH" and obj.mode != "EDIT":
         return read_mesh(obj.data, obj.name)
     try:
         mesh = obj.to_mesh()

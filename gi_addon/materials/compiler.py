@@ -15,6 +15,8 @@ from dataclasses import dataclass, field
 from ..scene import Image, Link, Node, ShaderGraph
 
 FLOAT, VECTOR, COLOR, CLOSURE = "float", "vector", "color", "closure"
+# Parameters are a uniform block, of which drivers give 64 KiB: beyond half of that tables get coarse.
+_TABLE_LIMIT = 8192
 _GLSL_TYPE = {FLOAT: "float", VECTOR: "vec3", COLOR: "vec3", CLOSURE: "Closure"}
 
 
@@ -41,7 +43,8 @@ class CompiledGraph:
 
     ``glsl`` defines ``surface_closure(SurfacePoint)`` or ``world_radiance(vec3)``; ``params`` are the floats it reads;
     ``images`` the scene's image indices it samples, as ``material_image_0`` …, with ``samplers`` (interpolation,
-    extension) each; ``attributes`` the mesh attributes, as ``attribute_value_0`` …. The flags say what a surface can do.
+    extension) each; ``attributes`` the mesh attributes, as ``attribute_value_0`` …; ``includes`` the shader files that few
+    graphs need, with the ``macros`` they are written in. The flags say what a surface can do.
     """
 
     glsl: str
@@ -50,6 +53,8 @@ class CompiledGraph:
     samplers: list[tuple[str, str]] = field(default_factory=list)
     attributes: list[str] = field(default_factory=list)
     approximated: list[str] = field(default_factory=list)
+    includes: list[str] = field(default_factory=list)
+    macros: dict[str, str] = field(default_factory=dict)
     emissive: bool = False
     transparent: bool = False
     transmissive: bool = False
@@ -71,6 +76,10 @@ class Compiler:
         self._outputs: dict[int, dict[str, Value]] = {}
         self._active: set[int] = set()
         self._count = 0
+        links = [v for n in graph.nodes for v in n.inputs.values() if isinstance(v, Link)]
+        links += [v for v in (graph.surface, graph.volume) if v is not None]
+        self._used = {(id(graph.nodes[link.node]), link.output) for link in links}
+        self._tables: dict[tuple, tuple[int, int]] = {}
 
     # -- for node functions --------------------------------------------------------------------------------------
 
@@ -88,6 +97,31 @@ class Compiler:
     def linked(self, node: Node, name: str) -> bool:
         """Whether input ``name`` is fed by another node."""
         return isinstance(node.inputs.get(name), Link)
+
+    def used(self, node: Node, *outputs: str) -> bool:
+        """Whether anything reads one of ``outputs`` of ``node``."""
+        return any((id(node), name) in self._used for name in outputs)
+
+    def include(self, path: str) -> None:
+        """Have shader file ``path`` in front of the material."""
+        if path not in self.result.includes:
+            self.result.includes.append(path)
+
+    def macro(self, name: str, value: int, otherwise: str) -> None:
+        """Define ``name`` as ``value``, or as ``otherwise`` once two nodes differ in it."""
+        old = self.result.macros.get(name, str(value))
+        self.result.macros[name] = str(value) if old == str(value) else otherwise
+
+    def table(self, rows: Sequence[Sequence[float]]) -> tuple[int, int]:
+        """Put rows of four floats among the parameters, the same rows once; returns (first parameter, rows)."""
+        if len(self.result.params) + 4 * len(rows) > _TABLE_LIMIT:
+            rows = [rows[i] for i in _spread(len(rows), min(len(rows), 33))]
+        key = tuple(tuple(float(v) for v in row) for row in rows)
+        if key not in self._tables:
+            self._tables[key] = (len(self.result.params), len(key))
+            for row in key:
+                self.result.params.extend((row + (0.0,) * 4)[:4])
+        return self._tables[key]
 
     def constant(self, value: float | tuple[float, ...], type: str) -> Value:
         """A parameter of ``type`` holding ``value``."""
@@ -159,7 +193,7 @@ class Compiler:
 
     def output(self, link: Link) -> Value:
         """The value at the far end of a link; each node is compiled once."""
-        from .nodes import NODES, fallback
+        from .nodes import INEXACT, NODES, fallback
 
         if link.node not in self._outputs:
             node = self.graph.nodes[link.node]
@@ -171,9 +205,11 @@ class Compiler:
             self._outputs[link.node] = function(self, node)
             self._active.discard(link.node)
         outputs = self._outputs[link.node]
+        node = self.graph.nodes[link.node]
+        if (node.kind, link.output) in INEXACT:
+            self.approximate(node, INEXACT[node.kind, link.output])
         if link.output in outputs:
             return outputs[link.output]
-        node = self.graph.nodes[link.node]
         self.approximate(node, f"output {link.output!r} is not available")
         return next(iter(outputs.values())) if outputs else Value(FLOAT, "0.0", (0.0,))
 
@@ -209,6 +245,11 @@ def compile_world(graph: ShaderGraph, images: Sequence[Image] = ()) -> CompiledG
     )
     c.result.constant = value.constant if len(value.constant or ()) == 3 else None
     return c.result
+
+
+def _spread(count: int, wanted: int) -> list[int]:
+    """``wanted`` indices spread over ``count``, first and last among them."""
+    return [round(i * (count - 1) / (wanted - 1)) for i in range(wanted)]
 
 
 def _gray(numbers: tuple[float, ...]) -> float:

@@ -27,6 +27,13 @@ def node(*kinds: str):
     return register
 
 
+# Outputs that exist but are not what Cycles computes.
+INEXACT = {
+    ("NEW_GEOMETRY", "Pointiness"): "Pointiness is ½",
+    ("NEW_GEOMETRY", "Random Per Island"): "Random Per Island is ½",
+    ("NEW_GEOMETRY", "Parametric"): "Parametric is 0",
+    ("LIGHT_PATH", "Ray Length"): "Ray Length is 0",
+}
 # Best constants of nodes that are not evaluated, by output.
 _FALLBACK = {
     "TEX_NOISE": {"Fac": 0.5, "Color": 0.5}, "TEX_VORONOI": {"Distance": 0.4, "Color": 0.5}, "TEX_WAVE": {"Fac": 0.5},
@@ -259,17 +266,28 @@ def value(c: Compiler, n: Node) -> dict[str, Value]:
     return {"Value": c.constant(n.params.get("value", 0.0), FLOAT)}
 
 
+def _transformed(c: Compiler, v: str, rows) -> str:
+    """``v`` under an affine matrix (three rows of four)."""
+    columns = ", ".join(c.constant(tuple(row[:3]), VECTOR).text for row in rows)
+    offset = c.constant(tuple(row[3] for row in rows), VECTOR)
+    return c.variable(VECTOR, f"({v}) * mat3({columns}) + {offset.text}").text
+
+
 @node("TEX_COORD")
 def texture_coordinate(c: Compiler, n: Node) -> dict[str, Value]:
-    """Object coordinates of another object are not followed."""
-    if n.params.get("object"):
-        c.approximate(n, "coordinates of another object are taken from this one")
-    direction = "point.position_ws" if c.world else "point.position_os"
+    """Object coordinates are this object's own, or those of ``object_matrix`` (3 rows of four: object from world)."""
+    direction = local = "point.position_ws" if c.world else "point.position_os"
+    rows = n.params.get("object_matrix")
+    if rows and c.used(n, "Object"):
+        local = _transformed(c, "point.position_ws", rows)
+    uv = Value(VECTOR, "vec3(0.0)")
+    if c.used(n, "UV") and not c.world:
+        uv = Value(VECTOR, f"vec3({c.attribute('uv:')}.xy, 0.0)")
     return {
         "Generated": Value(VECTOR, direction if c.world else "point.generated"),
         "Normal": Value(VECTOR, "point.normal_ws" if c.world else "point.normal_os"),
-        "UV": Value(VECTOR, f"vec3({c.attribute('uv:')}.xy, 0.0)" if not c.world else "vec3(0.0)"),
-        "Object": Value(VECTOR, direction),
+        "UV": uv,
+        "Object": Value(VECTOR, local),
         "Camera": Value(VECTOR, "point.position_vs"),
         "Window": Value(VECTOR, "vec3(point.window, 0.0)"),
         "Reflection": Value(VECTOR, "reflect(-point.view_ws, point.normal_ws)"),
@@ -371,11 +389,7 @@ def _coordinate(c: Compiler, n: Node, default: str) -> str:
     """The texture coordinate: the linked vector, or ``default``; then the node's own mapping."""
     text = c.input(n, "Vector", VECTOR).text if c.linked(n, "Vector") else default
     mapping = n.params.get("texture_mapping")
-    if mapping:
-        rows = ", ".join(c.constant(tuple(row[:3]), VECTOR).text for row in mapping)
-        offset = c.constant(tuple(row[3] for row in mapping), VECTOR)
-        text = c.variable(VECTOR, f"({text}) * mat3({rows}) + {offset.text}").text
-    return text
+    return _transformed(c, text, mapping) if mapping else text
 
 
 @node("TEX_IMAGE")
@@ -389,15 +403,21 @@ def image_texture(c: Compiler, n: Node) -> dict[str, Value]:
     projection = n.params.get("projection", "FLAT")
     encoded, opaque = c.image_flags(index)
     extension = ("REPEAT", "EXTEND", "CLIP", "MIRROR").index(n.params.get("extension", "REPEAT"))
+    if extension == 2 and n.params.get("interpolation") == "Closest":
+        extension = 4
     flags = f"{int(encoded)}, {extension}"
-    projection = n.params.get("projection", "FLAT")
     if projection == "BOX":
         blend = c.constant(n.params.get("projection_blend", 0.0), FLOAT)
         text = f"node_image_box({sampler}, {co}, point.normal_os, {blend.text}, {flags})"
     else:
         co = {"SPHERE": f"node_map_to_sphere({co})", "TUBE": f"node_map_to_tube({co})"}.get(projection, f"({co}).xy")
-        text = f"node_image({sampler}, {co}, {flags})"
-    return _texel(c, n, text, opaque and extension != 2)
+        cubic = n.params.get("interpolation") in ("Cubic", "Smart")
+        kind = "" if projection == "FLAT" else "_around"
+        text = f"node_image{'_cubic' if cubic else kind}({sampler}, {co}, {flags})"
+        if n.params.get("tiles"):
+            grid = ", ".join(f"{float(v)}" for v in n.params["tiles"])
+            text = f"node_image_tiled({sampler}, {co}, vec4({grid}), {int(encoded)})"
+    return _texel(c, n, text, opaque and extension not in (2, 4))
 
 
 def _texel(c: Compiler, n: Node, text: str, opaque: bool) -> dict[str, Value]:
@@ -417,7 +437,7 @@ def environment_texture(c: Compiler, n: Node) -> dict[str, Value]:
     sampler = c.image(index, n.params.get("interpolation", "Linear"), "REPEAT")
     mapping = "node_direction_to_mirror_ball" if n.params.get("projection") == "MIRROR_BALL" else "node_equirect"
     encoded, opaque = c.image_flags(index)
-    return _texel(c, n, f"node_image({sampler}, {mapping}({co}), {int(encoded)}, 0)", opaque)
+    return _texel(c, n, f"node_image_around({sampler}, {mapping}({co}), {int(encoded)}, 0)", opaque)
 
 
 @node("TEX_CHECKER")
@@ -506,7 +526,7 @@ _VECTOR_MATH = {
     "REFLECT": "reflect({a}, safe_normalize({b}))", "REFRACT": "refract({a}, safe_normalize({b}), {s})",
     "FACEFORWARD": "faceforward({a}, {b}, {c})", "SCALE": "{a} * {s}", "NORMALIZE": "safe_normalize({a})",
     "ABSOLUTE": "abs({a})", "MINIMUM": "min({a}, {b})", "MAXIMUM": "max({a}, {b})", "FLOOR": "floor({a})",
-    "CEIL": "ceil({a})", "FRACTION": "fract({a})", "MODULO": "safe_modulo({a}, {b})",
+    "ROUND": "floor({a} + 0.5)", "CEIL": "ceil({a})", "FRACTION": "fract({a})", "MODULO": "safe_modulo({a}, {b})",
     "SNAP": "floor(safe_divide({a}, {b})) * {b}", "WRAP": "node_wrap({a}, {b}, {c})", "SINE": "sin({a})",
     "COSINE": "cos({a})", "TANGENT": "tan({a})", "SIGN": "sign({a})", "POWER": "safe_pow({a}, {b})",
 }  # fmt: skip
@@ -679,33 +699,27 @@ def map_range(c: Compiler, n: Node) -> dict[str, Value]:
 
 @node("VALTORGB")
 def color_ramp(c: Compiler, n: Node) -> dict[str, Value]:
-    """A colour ramp by its stops; ``stops`` is rows (position, r, g, b, a), evaluated by the host's table of 257."""
+    """A colour ramp by its stops; ``stops`` is rows (position, r, g, b, a), evaluated by the host's table."""
     factor = c.input(n, "Fac", FLOAT, 0.5)
-    first, count = _table(c, n.params.get("table", [(0.0,) * 4, (1.0,) * 4]))
+    first, count = c.table(n.params.get("table", [(0.0,) * 4, (1.0,) * 4]))
     out = c.name()
-    c.statement(f"vec4 {out} = node_table({first}, {count}, {factor.text}, {int(n.params.get('constant', False))});")
+    mode = "TABLE_CONSTANT" if n.params.get("constant", False) else "TABLE_LINEAR"
+    c.statement(f"vec4 {out} = node_table({first}, {count}, {factor.text}, {mode});")
     return {"Color": Value(COLOR, f"{out}.xyz"), "Alpha": Value(FLOAT, f"{out}.w")}
-
-
-def _table(c: Compiler, rows) -> tuple[int, int]:
-    """Append rows of four floats to the parameters; returns (first parameter, number of rows)."""
-    first = len(c.result.params)
-    for row in rows:
-        c.result.params.extend(float(v) for v in row)
-    return first, len(rows)
 
 
 @node("CURVE_RGB", "CURVE_VEC", "CURVE_FLOAT")
 def curves(c: Compiler, n: Node) -> dict[str, Value]:
-    """Curves by the host's table of 257 values per channel, over ``range``."""
+    """Curves by the host's table per channel, over ``range``; beyond it they go on straight where ``extend`` says so."""
+    mode = "TABLE_EXTEND" if n.params.get("extend") else "TABLE_LINEAR"
     low, high = n.params.get("range", (0.0, 1.0))
     factor = c.input(n, "Factor" if n.kind == "CURVE_FLOAT" else "Fac", FLOAT, 1.0)
     span = c.constant(1.0 / (high - low) if high > low else 1.0, FLOAT)
     start = c.constant(low, FLOAT)
-    first, count = _table(c, n.params["table"])
+    first, count = c.table(n.params["table"])
 
     def look_up(v: str, axis: str) -> str:
-        return f"node_table({first}, {count}, ({v} - {start.text}) * {span.text}, 0).{axis}"
+        return f"node_table({first}, {count}, ({v} - {start.text}) * {span.text}, {mode}).{axis}"
 
     if n.kind == "CURVE_FLOAT":
         v = c.input(n, "Value", FLOAT, 1.0)

@@ -7,6 +7,7 @@ from ..facts import Facts
 from ..frame import Frame
 from ..graph import Pass, Planned, Texture, Uniform
 from .gbuffer import _screen
+from .occupancy import cell_grid
 
 
 class AOGeneration(Pass):
@@ -37,9 +38,18 @@ class AOGeneration(Pass):
             ao_steps=facts.settings.ao.steps,
             # Nothing of the scene is farther than its own diameter; and only the pass itself asks for that far.
             ao_distance=min(facts.ao_distance, 2.0 * facts.radius) if "ao" in facts.layers else 0.0,
-            ao_contact=facts.settings.ao.contact * facts.radius,
+            ao_contact=_contact(facts),
         )
         frame.screen(planned, program)
+
+
+def _contact(facts: Facts) -> float:
+    """How far an occluder dims untested indirect light, m. Where a grid of cells tests it, only what the cells around the
+    surface itself can't tell is left to do: two of them."""
+    contact = facts.settings.ao.contact * facts.radius
+    if facts.settings.technique == "RSM" and facts.settings.rsm.visibility == "CELLS":
+        return min(contact, 2.0 * cell_grid(facts).cell)
+    return contact
 
 
 class AOBlur(Pass):

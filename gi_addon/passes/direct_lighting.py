@@ -8,6 +8,7 @@ from ..frame import Frame
 from ..graph import Optional, Pass, Planned, Texture, Uniform
 from ..sequence import sobol_2d
 from .gbuffer import _screen
+from .volumetric import MEDIUM_UNIFORMS, medium_defines, set_medium
 
 
 class DirectLighting(Pass):
@@ -30,14 +31,19 @@ class DirectLighting(Pass):
         Uniform("light_count", "int", "lights in the list"),
         Uniform("softness", "float", "radius of the shadow filter, texels"),
         Uniform("filter_turn", "float", "rotation of the shadow filter in this sub-frame, rad"),
+        *MEDIUM_UNIFORMS,
     )
     shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "passes/direct_lighting_frag.glsl"}}
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return medium_defines(facts)
 
     def absent(self, facts: Facts) -> str | None:
         return None if facts.lit else "no light shines"
 
     def run(self, frame: Frame, planned: Planned) -> None:
         program = frame.program(planned)
+        set_medium(frame, program, planned.facts)
         frame.set(
             program,
             light_count=len(planned.facts.rig.sources),

@@ -34,6 +34,16 @@ vec3 safe_normalize(vec3 v)
 bool is_finite(float x) { return !(isnan(x) || isinf(x)); }
 bool is_finite(vec3 v) { return is_finite(v.x) && is_finite(v.y) && is_finite(v.z); }
 
+// What turns normals under m, of any scale: the cofactor matrix, scaled to near 1, its determinant's sign taken out so
+// that normals keep their side in a mirror.
+mat3 normal_matrix(mat3 m)
+{
+    mat3 cofactor = mat3(cross(m[1], m[2]), cross(m[2], m[0]), cross(m[0], m[1]));
+    float mirrored = dot(m[0], cofactor[0]) < 0.0 ? -1.0 : 1.0;
+    float size = max(max(dot(cofactor[0], cofactor[0]), dot(cofactor[1], cofactor[1])), dot(cofactor[2], cofactor[2]));
+    return cofactor * (size > 0.0 ? mirrored * inversesqrt(size) : 0.0);
+}
+
 // A right-handed frame with z = n. T. Duff et al., "Building an Orthonormal Basis, Revisited", JCGT 6(1), 2017.
 mat3 frame_from_normal(vec3 n)
 {

@@ -18,6 +18,7 @@ struct SurfacePoint {
     float object_index;
     float object_random;
     mat3 world_from_object_normal;
+    mat3 world_from_object;
 };
 
 // A material's own normal, kept a unit vector on the visible side of the triangle.
@@ -31,5 +32,5 @@ SurfacePoint surface_point_of_world(vec3 direction_ws)
 {
     return SurfacePoint(direction_ws, direction_ws, direction_ws, direction_ws, -direction_ws, -direction_ws,
                         -direction_ws, -direction_ws, 0.0, vec2(0.0), vec3(0.0), vec4(1.0), 0.0, 0.0,
-                        mat3(1.0));
+                        mat3(1.0), mat3(1.0));
 }

@@ -108,6 +108,9 @@ vec3 blend_color(float f, vec3 a, vec3 b)
 
 vec3 node_gamma(vec3 c, float g)
 {
+    if (g == 0.0) {
+        return vec3(1.0);
+    }
     return vec3(c.r > 0.0 ? pow(c.r, g) : c.r, c.g > 0.0 ? pow(c.g, g) : c.g, c.b > 0.0 ? pow(c.b, g) : c.b);
 }
 
@@ -120,16 +123,23 @@ vec3 node_hue_saturation(float hue, float saturation, float value, float factor,
     return max(mix(color, hsv_to_rgb(hsv), factor), vec3(0.0));
 }
 
-// A table of `count` rows of four in the parameters, from index `first`, over [0, 1].
-vec4 node_table(int first, int count, float t, int constant)
+// A table of `count` rows of four in the parameters, from index `first`, over [0, 1]: interpolated, in steps, or
+// interpolated and straight on beyond its ends.
+#define TABLE_LINEAR 0
+#define TABLE_CONSTANT 1
+#define TABLE_EXTEND 2
+vec4 table_row(int first, int i)
 {
-    float x = saturate(t) * float(count - 1);
-    int i = constant != 0 ? int(x) : min(int(x), max(count - 2, 0));
-    float f = constant != 0 ? 0.0 : x - float(i);
-    vec4 a = vec4(material_param(first + 4 * i), material_param(first + 4 * i + 1), material_param(first + 4 * i + 2),
-                  material_param(first + 4 * i + 3));
-    int j = min(i + 1, count - 1);
-    vec4 b = vec4(material_param(first + 4 * j), material_param(first + 4 * j + 1), material_param(first + 4 * j + 2),
-                  material_param(first + 4 * j + 3));
-    return mix(a, b, f);
+    int k = first + 4 * i;
+    return vec4(material_param(k), material_param(k + 1), material_param(k + 2), material_param(k + 3));
+}
+vec4 node_table(int first, int count, float t, int mode)
+{
+    float x = (mode == TABLE_EXTEND ? t : saturate(t)) * float(count - 1);
+    int i = clamp(int(x), 0, mode == TABLE_CONSTANT ? count - 1 : max(count - 2, 0));
+    vec4 a = table_row(first, i);
+    if (mode == TABLE_CONSTANT) {
+        return a;
+    }
+    return mix(a, table_row(first, min(i + 1, count - 1)), x - float(i));
 }

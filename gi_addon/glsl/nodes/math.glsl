@@ -110,3 +110,15 @@ vec3 node_mapping_normal(vec3 v, vec3 location, vec3 rotation, vec3 scale)
 {
     return safe_normalize(euler_xyz(rotation) * safe_divide(v, scale));
 }
+
+// Around an axis by an angle (O. Rodrigues); the zero axis turns nothing.
+vec3 node_rotate(vec3 v, vec3 center, vec3 axis, float angle)
+{
+    axis = safe_normalize(axis);
+    if (dot(axis, axis) == 0.0) {
+        return v;
+    }
+    vec3 p = v - center;
+    float c = cos(angle);
+    return p * c + cross(axis, p) * sin(angle) + axis * (dot(axis, p) * (1.0 - c)) + center;
+}

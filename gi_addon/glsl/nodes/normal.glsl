@@ -45,3 +45,13 @@ vec3 node_bump(float height, float strength, float distance_, vec3 n, SurfacePoi
     vec3 bumped = safe_normalize(abs(det) * n - distance_ * gradient);
     return safe_normalize(mix(n, bumped, max(strength, 0.0)));
 }
+
+// Along a UV map's u, by screen derivatives.
+vec3 node_tangent_uv(vec2 uv, SurfacePoint point)
+{
+    vec3 n = point.normal_ws;
+    vec3 dp1 = dFdx(point.position_ws);
+    vec3 dp2 = dFdy(point.position_ws);
+    float handed = dot(cross(dp1, dp2), n) < 0.0 ? -1.0 : 1.0;
+    return handed * safe_normalize(cross(dp2, n) * dFdx(uv.x) + cross(n, dp1) * dFdy(uv.x));
+}

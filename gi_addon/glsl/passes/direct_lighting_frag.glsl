@@ -8,6 +8,9 @@
 #include "lib/bsdf_lib.glsl"
 #include "lib/sequence_lib.glsl"
 #include "lib/shadow_lib.glsl"
+#if HAS_MEDIUM
+#include "lib/medium_lib.glsl"
+#endif
 
 // GGX alpha after convolution with a uniform disc of angular radius θ: the half vector turns half as far as the light,
 // whose variance per axis is θ²/4, so slopes gain θ²/16; α² is twice the slopes' variance (Beckmann's relation).
@@ -66,6 +69,9 @@ void main()
                 }
 #endif
             }
+#if HAS_MEDIUM
+            arriving *= medium_transmittance(position_ws, l, light_is_directional(light) ? 1e30 : length(light.position_ws - position_ws));
+#endif
             vec3 irradiance = arriving * cos_l;
             open_light += irradiance;
             lit_light += irradiance * visible;

@@ -85,19 +85,26 @@ void main()
         through_color = vec3(0.0);
     }
 #endif
+    // What is behind a medium arrives dimmed, in every pass, the colours too, as in Cycles.
+    vec3 passes = vec3(1.0);
 #if HAS_VOLUME_LIGHT
-    // What is behind a medium arrives dimmed, in every pass, as in Cycles.
-    vec4 medium = texelFetch(volume_light, pixel, 0);
-    volume = medium.rgb;
-    diffuse_direct *= medium.a;
-    diffuse_indirect *= medium.a;
-    glossy_direct *= medium.a;
-    glossy_indirect *= medium.a;
-    through_direct *= medium.a;
-    through_indirect *= medium.a;
-    emission *= medium.a;
-    environment *= medium.a;
+    volume = texelFetch(volume_light, pixel, 0).rgb;
 #endif
+#if HAS_VOLUME_TRANSMITTANCE
+    passes = texelFetch(volume_transmittance, pixel, 0).rgb;
+#elif HAS_VOLUME_LIGHT
+    passes = vec3(texelFetch(volume_light, pixel, 0).a);
+#endif
+    diffuse_color *= passes;
+    through_color *= passes;
+    diffuse_direct *= passes;
+    diffuse_indirect *= passes;
+    glossy_direct *= passes;
+    glossy_indirect *= passes;
+    through_direct *= passes;
+    through_indirect *= passes;
+    emission *= passes;
+    environment *= passes;
 
 #if LAYER_COMBINED >= 0
     float alpha = surface || view.film_transparent < 0.5 ? 1.0 : 0.0;
@@ -144,7 +151,7 @@ void main()
         Lobe lobe = Lobe(specular.rgb, packed_lobe.g, specular.a, packed_lobe.r, packed_lobe.b);
         vec3 n = octahedral_decode(texelFetch(gbuf_normal, pixel, 0).xy);
         float cos_v = saturate(abs(dot(n, view_direction_ws(uv))));
-        glossy_color = lobe_albedo(brdf_albedo, brdf_average, brdf_energy, lobe, cos_v);
+        glossy_color = lobe_albedo(brdf_albedo, brdf_average, brdf_energy, lobe, cos_v) * passes;
     }
 #endif
     add(LAYER_GLOSSY_COLOR, pixel, vec4(glossy_color, 1.0));

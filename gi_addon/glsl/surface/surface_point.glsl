@@ -15,7 +15,7 @@ in vec3 vary_generated;
 flat in vec4 vary_color;
 flat in vec2 vary_info;
 flat in vec3 vary_location;
-flat in mat3 vary_world_from_object_normal;
+flat in mat3 vary_world_from_object;
 #endif
 
 SurfacePoint surface_point(vec3 view_ws)
@@ -39,18 +39,19 @@ SurfacePoint surface_point(vec3 view_ws)
     p.position_vs = vec3(1.0, 1.0, -1.0) * (view.view_from_world * vec4(vary_position_ws, 1.0)).xyz;
 #if SURFACE_OBJECT_SPACE
     p.position_os = vary_position_os;
-    p.normal_os = safe_normalize(vary_normal_os);
+    p.normal_os = safe_normalize(vary_normal_os) * (1.0 - 2.0 * p.backfacing);
     p.generated = vary_generated;
     p.object_location = vary_location;
     p.object_color = vary_color;
     p.object_index = vary_info.x;
     p.object_random = vary_info.y;
-    p.world_from_object_normal = vary_world_from_object_normal;
+    p.world_from_object = vary_world_from_object;
+    p.world_from_object_normal = normal_matrix(vary_world_from_object);
 #else
     p.position_os = p.normal_os = p.generated = p.object_location = vec3(0.0);
     p.object_color = vec4(1.0);
     p.object_index = p.object_random = 0.0;
-    p.world_from_object_normal = mat3(1.0);
+    p.world_from_object_normal = p.world_from_object = mat3(1.0);
 #endif
     return p;
 }

@@ -1,6 +1,8 @@
 // Vertices of the scene's meshes for any view: camera, light map, voxels. One instance per draw of a mesh, its transform
 // in instance attributes, so that one indirect call draws any number of objects.
 
+#include "lib/math_lib.glsl"
+
 in vec3 in_position;
 in vec3 instance_row_0; // rows of world_from_object
 in vec3 instance_row_1;
@@ -26,7 +28,7 @@ out vec3 vary_generated;
 flat out vec4 vary_color;
 flat out vec2 vary_info;
 flat out vec3 vary_location;
-flat out mat3 vary_world_from_object_normal;
+flat out mat3 vary_world_from_object;
 #endif
 #if SURFACE_ATTRIBUTES > 0
 in vec4 in_attribute_0;
@@ -57,14 +59,8 @@ void main()
     gl_Position = clip_from_world * vec4(position_ws, 1.0);
 #if SURFACE_FULL
     vary_position_ws = position_ws;
-    // The cofactor matrix turns normals under any scale; its determinant's sign keeps them on their side in a mirror.
-    mat3 cofactor = mat3(cross(m[1], m[2]), cross(m[2], m[0]), cross(m[0], m[1]));
-    float mirrored = dot(m[0], cofactor[0]) < 0.0 ? -1.0 : 1.0;
-    // Cofactors shrink with the square of the scale: bring them near 1 before they are normalised.
-    float size = max(max(dot(cofactor[0], cofactor[0]), dot(cofactor[1], cofactor[1])), dot(cofactor[2], cofactor[2]));
-    cofactor *= size > 0.0 ? mirrored * inversesqrt(size) : 0.0;
     vec3 normal_os = vec3(in_normal.xyz) * (1.0 / 32767.0);
-    vary_normal_ws = cofactor * normal_os;
+    vary_normal_ws = normal_matrix(m) * normal_os;
     float l2 = dot(vary_normal_ws, vary_normal_ws);
     vary_normal_ws *= l2 > 0.0 ? inversesqrt(l2) : 0.0;
     vary_relative_ws = m * in_position;
@@ -76,7 +72,7 @@ void main()
     vary_color = instance_color;
     vary_info = instance_info;
     vary_location = instance_translation;
-    vary_world_from_object_normal = cofactor;
+    vary_world_from_object = m;
 #endif
 #if SURFACE_ATTRIBUTES > 0
     vary_attribute_0 = in_attribute_0;

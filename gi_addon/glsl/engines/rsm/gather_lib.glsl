@@ -6,6 +6,31 @@
 // with both cosines in it, so that patches seen edge-on — a sphere's inside, a corner — lose no light to the bound.
 
 #include "lib/math_lib.glsl"
+#if HAS_MEDIUM
+#include "lib/medium_lib.glsl"
+#endif
+#if HAS_OCCUPANCY
+#include "lib/occupancy_lib.glsl"
+#endif
+#if HAS_OCCUPANCY && MESH_LIGHTS
+#include "generated/light.glsl"
+
+// Whether the triangle that lit a virtual light from one side hides it on the other: lamps hang closer to ceilings than any
+// cell is small. T. Möller and B. Trumbore, JGT 2(1), 1997.
+bool own_lamp_blocks(Light light, vec3 from_ws, vec3 to_ws)
+{
+    if (light.kind != LIGHT_MESH) {
+        return false;
+    }
+    vec3 d = to_ws - from_ws;
+    vec3 p = cross(d, light.v_ws);
+    float determinant = dot(light.u_ws, p);
+    vec3 s = from_ws - light.center_ws;
+    vec3 q = cross(s, light.u_ws);
+    vec3 hit = vec3(dot(s, p), dot(d, q), dot(light.v_ws, q)) / (abs(determinant) > 0.0 ? determinant : 1e30);
+    return hit.x >= 0.0 && hit.y >= 0.0 && hit.x + hit.y <= 1.0 && hit.z > 1e-4 && hit.z < 1.0 - 1e-4;
+}
+#endif
 
 struct Gathered {
     vec3 radiance;    // E/π: what a white Lambert surface reflects, W/(m²·sr)
@@ -15,6 +40,9 @@ struct Gathered {
 Gathered gather_vpls(vec3 position_ws, vec3 n, vec3 ng)
 {
     Gathered g = Gathered(vec3(0.0), vec4(0.0));
+#if HAS_OCCUPANCY
+    vec3 start_ws = cells_clear(position_ws, ng);
+#endif
     for (int i = 0; i < vpl_count; ++i) {
         Vpl vpl = vpls[i];
         vec3 d = vpl.position_ws - position_ws;
@@ -26,13 +54,27 @@ Gathered gather_vpls(vec3 position_ws, vec3 n, vec3 ng)
         if (cos_p <= 0.0 || cos_g <= 0.0) {
             continue;
         }
+#if HAS_OCCUPANCY && MESH_LIGHTS
+        if (own_lamp_blocks(rsm_lights[vpl.light], vpl.position_ws, position_ws)) {
+            continue;
+        }
+#endif
+#if HAS_OCCUPANCY
+        if (cells_block(start_ws, cells_clear(vpl.position_ws, vpl.normal_ws))) {
+            continue;
+        }
+#endif
         float cos_x = max(dot(w, n), 0.0);
         // Φ/A · K A/(1 + K A) without the area: Φ cos cos / (π d² + cos cos A).
         float product = cos_p * cos_x;
         float kernel = product / (PI * d2 + product * vpl.area);
-        g.radiance += vpl.flux * kernel;
+        vec3 flux = vpl.flux;
+#if HAS_MEDIUM
+        flux *= medium_transmittance(position_ws, w, sqrt(d2));
+#endif
+        g.radiance += flux * kernel;
         // Light per direction, by the same bound but for the receiver's own cosine.
-        float arriving = luminance(vpl.flux) * cos_p / (PI * d2 + cos_p * vpl.area);
+        float arriving = luminance(flux) * cos_p / (PI * d2 + cos_p * vpl.area);
         g.direction += vec4(w, 1.0) * arriving;
     }
     g.radiance *= INV_PI;

@@ -31,7 +31,7 @@ void main()
         radiance = gather_vpls(position_ws, n, ng).radiance;
     }
 #if HAS_AO
-    radiance *= texelFetch(ao, pixel, 0).g; // virtual point lights see through everything
+    radiance *= texelFetch(ao, pixel, 0).g; // nearer than visibility is tested, or everywhere if it is not
 #endif
     indirect_diffuse = vec4(radiance, 1.0);
 }

@@ -2,6 +2,9 @@
 // declared.
 
 #include "lib/light_lib.glsl"
+#if HAS_MEDIUM
+#include "lib/medium_lib.glsl"
+#endif
 
 struct RsmTexel {
     vec3 position_ws;
@@ -45,6 +48,9 @@ RsmTexel rsm_texel(int index, ivec2 pixel)
     float cos_g = max(dot(t.normal_ws, to_light), GRAZING_COS);
     float cos_s = max(dot(n, to_light), 0.0);
     t.area = beam / cos_g;
+#if HAS_MEDIUM
+    arriving *= medium_transmittance(t.position_ws, to_light, v.perspective > 0.5 ? length(v.origin_ws - t.position_ws) : 1e30);
+#endif
     t.flux = arriving * albedo.rgb * (cos_s / cos_g);
     return t;
 }

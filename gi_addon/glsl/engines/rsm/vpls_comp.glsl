@@ -19,6 +19,7 @@ void main()
     Vpl none;
     none.position_ws = vec3(0.0);
     none.area = 0.0;
+    none.light = 0;
     none.normal_ws = vec3(0.0, 0.0, 1.0);
     none.flux = vec3(0.0);
     vpls[i] = none;
@@ -68,6 +69,7 @@ void main()
     Vpl vpl;
     vpl.position_ws = t.position_ws;
     vpl.normal_ws = t.normal_ws;
+    vpl.light = rsm_views[index].light;
     vpl.flux = t.flux / (float(vpl_count) * probability);
     // The disc that a sample stands for among those of all sub-frames: its own singularity is averaged with theirs.
     vpl.area = t.area / (float(vpl_count) * float(view.subframes) * probability);

@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The commands that measure: ``quartet stability`` and ``quartet bench``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+from rich.console import Console
+from rich.table import Table
+
+console = Console(stderr=True)
+
+
+def technique_names(text: str | None) -> list[str]:
+    """'RSM,LPV' as names that exist; all of them for None."""
+    from .engines import TECHNIQUES
+
+    if not text:
+        return list(TECHNIQUES)
+    names = [part.strip().upper() for part in text.split(",") if part.strip()]
+    unknown = [name for name in names if name not in TECHNIQUES]
+    if unknown or not names:
+        raise click.UsageError(f"no technique {', '.join(unknown) or 'given'}; there are {', '.join(TECHNIQUES)}")
+    return names
+
+
+@click.command("stability")
+@click.option("--techniques", help="Techniques separated by commas; all by default.")
+@click.option("--tests", help="Test numbers separated by commas, e.g. 1,5,11; all by default.")
+@click.option("--full", is_flag=True, help="Sweep everything the protocol lists, with default structure sizes.")
+@click.option("--strict", is_flag=True, help="Exit with 1 if a test fails that the technique could pass.")
+@click.option("-o", "--output", type=click.Path(path_type=Path), default=Path("quartet-stability"), show_default=True,
+              help="Folder for stability.html and stability.json.")
+def stability_command(techniques, tests, full, strict, output) -> None:
+    """Run the stability suite: value, limit and verdict of every test for every technique."""
+    from .compare import stability, stability_checks  # noqa: F401 — the second fills the registry
+
+    names = technique_names(techniques)
+    keys = [k.strip() for k in tests.split(",")] if tests else list(stability.TESTS)
+    unknown = [k for k in keys if k not in stability.TESTS]
+    if unknown:
+        raise click.UsageError(f"no test {', '.join(unknown)}; there are {', '.join(stability.TESTS)}")
+
+    def said(technique: str, test: stability.Test, finding: stability.Finding) -> None:
+        missed = next((q for q in finding.quantities if q.limited and not q.holds), None)
+        detail = f"{missed.name} = {missed.value:.4g}, limit {missed.limit}" if missed else finding.note
+        console.print(f"{technique:5s} {test.key:>3s} {test.title:26s} {finding.verdict:14s} {detail}", highlight=False)
+
+    results = stability.run(names, keys, full=full, progress=said)
+    table = Table("test", *names)
+    for key in keys:
+        table.add_row(f"{key} {stability.TESTS[key].title}", *(results[t][key].verdict for t in names))
+    Console().print(table)
+    for path in stability.write(results, output, full=full):
+        console.print(f"wrote {path}")
+    bad = [f"{t} {k}" for t, fs in results.items() for k, f in fs.items() if f.verdict in (stability.FAIL, stability.ERROR)]
+    if strict and bad:
+        raise click.ClickException(f"{len(bad)} failed: {', '.join(bad)}")
+
+
+@click.command("bench")
+@click.argument("scene", type=click.Path(path_type=Path), required=False)
+@click.option("--techniques", help="Techniques separated by commas; all by default.")
+@click.option("--scale", type=click.FloatRange(0.01, 4.0), help="Share of the paper's picture size; 1 on a GPU, 0.1 on a software driver.")
+@click.option("--frames", type=click.IntRange(1), help="Frames of each kind per row; 50 on a GPU, 5 on a software driver.")
+@click.option("--rows", help="Only rows whose name holds this text, e.g. '512²' or '1280x720'.")
+@click.option("--limit", type=float, default=60.0, show_default=True, help="Skip a row whose first frame takes longer, s.")
+@click.option("-o", "--output", type=click.Path(path_type=Path), default=Path("quartet-bench"), show_default=True,
+              help="Folder for bench.html, bench.json and bench.csv.")
+def bench_command(scene, techniques, scale, frames, rows, limit, output) -> None:
+    """The paper's Table 2 on this machine: frame rates of SCENE (Sponza, as there; a Cornell box if none is given)."""
+    from .compare import bench, scenes
+    from .compare.paper import TABLE_2
+    from .gl import shared
+    from .scene import Scene
+
+    names = technique_names(techniques)
+    chosen = [r for r in TABLE_2 if r.technique in names and (not rows or rows.lower() in r.key.lower())]
+    if not chosen:
+        raise click.UsageError(f"no row of the table matches {rows!r} for {', '.join(names)}")
+    if scene is None:
+        plain, label = scenes.cornell(light="sun"), "Cornell box"
+    elif scene.suffix.lower() == ".npz":
+        plain, label = Scene.load(scene), scene.name
+    else:
+        from .cli import _blender, _sync
+
+        with _blender(scene, None, None, (1280, 720), None, ()) as bscene:
+            (plain, _), label = _sync(bscene), scene.name
+    scale = scale or (0.1 if shared().call(lambda gl: gl.software) else 1.0)
+    calibration, timings = bench.bench(
+        plain, techniques=names, scale=scale, frames=frames, rows=chosen, limit_s=limit,
+        progress=lambda text: console.print(text, style="dim", highlight=False),
+    )  # fmt: skip
+    table = Table("technique", "setting", "paper", "paper fps", "here", "ms moving", "ms still", "fps", "× paper", "per hardware", "MiB")
+    for r in bench.records(calibration, timings):
+        paper_fps = "–" if r["paper_fps"] is None else f"{r['paper_fps']:g}{'?' if r['paper_doubtful'] else ''}"
+        numbers = [r["problem"], *[""] * 5] if r["problem"] else [
+            f"{r['ms']:.2f} ± {r['mad']:.2f}", f"{r['still_ms']:.2f}", f"{r['fps']:.1f}",
+            f"{r['ratio']:.3g}" if r["ratio"] else "–", f"{r['ratio_per_hardware']:.3g}" if r["ratio"] else "–", f"{r['planned_mib']:.1f}",
+        ]  # fmt: skip
+        table.add_row(r["technique"], r["setting"], r["paper_resolution"], paper_fps, r["resolution"], *numbers)
+    Console().print(table)
+    console.print(bench.hardware_text(calibration), highlight=False)
+    for path in bench.write(output, label, scale, calibration, timings):
+        console.print(f"wrote {path}")

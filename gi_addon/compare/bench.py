@@ -1,0 +1,281 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Table 2: how long a frame takes, for every row of the paper.
+
+As there, only indirect diffuse light, shadows and ambient occlusion are on, and the scene has its sun alone. Two kinds of
+frame are timed: *moving* (the sun turns by a hair every frame, so whatever depends on light is made anew; the paper's
+kind) and *still* (all that can be kept is kept). Rows are interleaved A B … B A, so that a machine that slows down slows
+all of them; medians and ratios of one run are what to look at.
+"""
+
+from __future__ import annotations
+
+import csv
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from .. import __version__
+from ..gl import GL, GLError, driver, shared
+from ..gl.context import MIB
+from ..renderer import Renderer
+from ..scene import Scene, World
+from ..settings import SettingError, Settings
+from .page import dump
+from .paper import GTX_1070, TABLE_2, Row
+
+_TOLERANCE = 0.03  # the protocol's upper bound for the calibration kernel's variation
+
+
+@dataclass
+class Calibration:
+    """This machine's arithmetic (GFLOP/s) and bandwidth (GB/s) as a fixed kernel sees them, its time in ms, how much it
+    still varied after warming up (coefficient of variation), and how often it ran."""
+
+    milliseconds: float
+    variation: float
+    runs: int
+    gflops: float
+    gbytes: float
+
+    @property
+    def settled(self) -> bool:
+        return self.variation <= _TOLERANCE
+
+    @property
+    def ratio(self) -> float:
+        """This machine over the paper's GTX 1070: the geometric mean of the two."""
+        return float(np.sqrt(self.gflops / GTX_1070["gflops"] * self.gbytes / GTX_1070["gbytes"]))
+
+
+def calibrate(gl: GL, *, invocations: int = 1 << 16, most: int = 40) -> Calibration:
+    """Run the fixed kernel until its last five times vary by less than 3 %, ``most`` times at the most."""
+    stride = invocations
+    data = np.random.default_rng(0).random((4 * stride, 4), np.float32)
+    source, target = gl.buffer("calibration source", data), gl.buffer("calibration target", size=data.nbytes)
+    programs = {
+        name: gl.program("Calibration", {"compute": "compare/calibrate_comp.glsl"}, defines={"ARITHMETIC": flag})
+        for name, flag in (("arithmetic", 1), ("bandwidth", 0))
+    }
+
+    def run(name: str, count: int = 1) -> float:
+        source.bind_to_storage_buffer(0)
+        target.bind_to_storage_buffer(1)
+        program = programs[name]
+        if "stride" in program:
+            program["stride"].value = stride
+        gl.ctx.finish()
+        start = time.perf_counter()
+        for _ in range(count):
+            program.run(invocations // 64)
+            gl.ctx.memory_barrier()
+        gl.ctx.finish()
+        return (time.perf_counter() - start) / count
+
+    try:
+        times: list[float] = []
+        variation = float("inf")
+        count = max(1, min(1000, int(0.005 / max(run("arithmetic"), 1e-7))))
+        while len(times) < 5 or (variation > _TOLERANCE and len(times) < most):
+            times.append(run("arithmetic", count))
+            last = times[-5:]
+            variation = float(np.std(last) / np.mean(last))
+        moved = min(run("bandwidth", count) for _ in range(5))
+        seconds = float(np.median(times[-5:]))
+        flops = invocations * 512 * 4 * 4 * 2
+        return Calibration(seconds * 1e3, variation, len(times), flops / seconds * 1e-9, 2.0 * data.nbytes / moved * 1e-9)
+    finally:
+        gl.release(source, target)
+
+
+@dataclass
+class Timing:
+    """One row, measured: milliseconds of every moving and still frame, per pass (median), bytes; ``problem`` instead of
+    numbers where it could not run."""
+
+    row: Row
+    size: tuple[int, int]
+    moving: list[float] = field(default_factory=list)
+    still: list[float] = field(default_factory=list)
+    passes: dict[str, float] = field(default_factory=dict)
+    planned_mib: float = 0.0
+    held_mib: float = 0.0
+    problem: str = ""
+
+    def summary(self) -> dict[str, float | None]:
+        """Median, MAD and P95 of moving frames; the same median of still ones; frames a second."""
+        if not self.moving:
+            return {}
+        median = float(np.median(self.moving))
+        return {
+            "ms": median, "mad": float(np.median(np.abs(np.array(self.moving) - median))),
+            "p95": float(np.percentile(self.moving, 95)), "worst": max(self.moving), "mean": float(np.mean(self.moving)),
+            "still_ms": float(np.median(self.still)), "fps": 1e3 / median, "still_fps": 1e3 / float(np.median(self.still)),
+        }  # fmt: skip
+
+
+def bench_settings(row: Row) -> Settings:
+    """The row's settings with everything off that the paper's table leaves out. Raises SettingError for a technique or
+    setting that this version lacks."""
+    settings = Settings()
+    settings.set("technique", row.technique)
+    for name, value in (("samples", 1), ("use_glossy", False), ("use_translucency", False), ("use_volumetric", False)):
+        settings.set(name, value)
+    for name, value in row.settings:
+        settings.set(name, value)
+    return settings
+
+
+def bench_scene(scene: Scene) -> Scene:
+    """The scene with its suns only, or its strongest light where it has none, and a black world."""
+    suns = [light for light in scene.lights if light.kind == "SUN"]
+    lights = suns or sorted(scene.lights, key=lambda light: -float(np.max(light.emission)))[:1]
+    return replace(scene, lights=lights, world=World())
+
+
+def nudged(scene: Scene, step: int) -> Scene:
+    """The scene with its lights turned by ``step`` microradians: another light to every cache, the same to the eye."""
+    angle = 1e-6 * step
+    turn = np.eye(4)
+    turn[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+    return replace(scene, lights=[replace(light, matrix=light.matrix @ turn) for light in scene.lights])
+
+
+def bench(
+    scene: Scene,
+    *,
+    techniques: Iterable[str],
+    scale: float = 1.0,
+    frames: int | None = None,
+    rows: Iterable[Row] | None = None,
+    limit_s: float = float("inf"),
+    progress: Callable[[str], None] = lambda text: None,
+) -> tuple[Calibration, list[Timing]]:
+    """Time every row of the paper's table for ``techniques`` at ``scale`` times its picture size.
+
+    ``frames`` of each kind per row (default 50 on a GPU, 5 on a software driver), half of them on the way there and half
+    on the way back. A row whose first frame takes longer than ``limit_s`` is left out, with that as its problem.
+    """
+    techniques = list(techniques)
+    chosen = [r for r in (rows or TABLE_2) if r.technique in techniques]
+    plain = bench_scene(scene)
+
+    def job(gl: GL) -> tuple[Calibration, list[Timing]]:
+        count = frames or (5 if gl.software else 50)
+        calibration = calibrate(gl)
+        timings = [
+            Timing(r, (max(1, round(r.resolution[0] * scale)), max(1, round(r.resolution[1] * scale)))) for r in chosen
+        ]
+        renderer = Renderer(gl)
+        steps = iter(range(1, 1 << 30))
+
+        def frame(settings: Settings, size: tuple[int, int], moving: bool, step: int) -> float:
+            target = nudged(plain, step) if moving else plain
+            gl.ctx.finish()
+            start = time.perf_counter()
+            renderer.begin(target, settings, ("Combined",), resolution=size, subframes=1)
+            renderer.subframe(0)
+            gl.ctx.finish()
+            return (time.perf_counter() - start) * 1e3
+
+        def visit(timing: Timing, n: int, measure_passes: bool) -> None:
+            settings = bench_settings(timing.row)
+            renderer.timers.enabled = False
+            first = frame(settings, timing.size, True, next(steps))
+            if first > limit_s * 1e3:
+                timing.problem = f"its first frame took {first / 1e3:.0f} s, over the limit of {limit_s:g} s"
+                return
+            frame(settings, timing.size, True, next(steps))
+            timing.moving += [frame(settings, timing.size, True, next(steps)) for _ in range(n)]
+            frame(settings, timing.size, False, 0)
+            timing.still += [frame(settings, timing.size, False, 0) for _ in range(n)]
+            if measure_passes:
+                renderer.timers.enabled = True
+                renderer.timers.reset()
+                for _ in range(max(2, n)):
+                    frame(settings, timing.size, True, next(steps))
+                timing.passes = {k: float(np.median(v)) for k, v in renderer.timers.collect().items()}
+                timing.planned_mib = renderer._plan.nbytes() / MIB
+                timing.held_mib = gl.bytes() / MIB
+
+        try:
+            there = [(t, -(-count // 2), True) for t in timings]
+            back = [(t, count // 2, False) for t in reversed(timings)]
+            for timing, n, measure_passes in there + back:
+                if timing.problem or not n:
+                    continue
+                progress(f"{timing.row.key} ({'there' if measure_passes else 'back'})")
+                try:
+                    visit(timing, n, measure_passes)
+                except (GLError, SettingError) as error:
+                    timing.problem = str(error)
+        finally:
+            renderer.timers.enabled = False
+            renderer.close()
+        return calibration, timings
+
+    return shared().call(job)
+
+
+def records(calibration: Calibration, timings: list[Timing]) -> list[dict]:
+    """One flat record per row, with the paper's rate and ours over it, raw and per hardware."""
+    out = []
+    for t in timings:
+        s = t.summary()
+        fps = s.get("fps")
+        out.append({
+            "technique": t.row.technique, "setting": t.row.label, "paper_resolution": "{}x{}".format(*t.row.resolution),
+            "resolution": "{}x{}".format(*t.size), "paper_fps": t.row.fps, "paper_doubtful": t.row.doubtful, **s,
+            "ratio": fps / t.row.fps if fps and t.row.fps else None,
+            "ratio_per_hardware": fps / t.row.fps / calibration.ratio if fps and t.row.fps else None,
+            "planned_mib": t.planned_mib, "held_mib": t.held_mib, "passes": t.passes, "problem": t.problem,
+        })  # fmt: skip
+    return out
+
+
+def write(folder: Path, scene_name: str, scale: float, calibration: Calibration, timings: list[Timing]) -> list[Path]:
+    """bench.json, bench.csv and bench.html."""
+    from .page import document, esc, table
+
+    folder.mkdir(parents=True, exist_ok=True)
+    rows = records(calibration, timings)
+    files = [folder / name for name in ("bench.json", "bench.csv", "bench.html")]
+    head = {"version": __version__, "driver": driver(), "scene": scene_name, "scale": scale,
+            "calibration": {**asdict(calibration), "settled": calibration.settled, "hardware_ratio": calibration.ratio},
+            "gtx_1070": GTX_1070}  # fmt: skip
+    files[0].write_text(dump({**head, "rows": rows, "frames": {t.row.key: {"moving": t.moving, "still": t.still} for t in timings}}))
+    columns = [k for k in max(rows, key=len) if k != "passes"] if rows else []
+    with files[1].open("w", newline="") as stream:
+        writer = csv.DictWriter(stream, columns, extrasaction="ignore")
+        writer.writeheader()
+        writer.writerows(rows)
+    body = [
+        "<h1>Table 2: frame rates</h1>",
+        f"<p class=lead>{esc(scene_name)}, picture × {scale:g}; Quartet {__version__} on {esc(head['driver'])}.</p>",
+        f"<p>{esc(hardware_text(calibration))}</p>",
+        "<p class=quiet>Moving: the sun turns a hair every frame, so everything that depends on light is made anew (the paper's "
+        "case). Still: what can be kept is kept. ms are medians of interleaved frames (A B … B A), ± the median absolute "
+        "deviation. A ratio at another picture size than the paper's is no statement about speed; ratios between rows are.</p>",
+        table(
+            ["technique", "setting", "paper at", "paper fps", "here at", "fps moving", "ms moving", "± MAD", "P95", "ms still",
+             "× paper", "× paper per hardware", "MiB planned", "MiB held", "costliest passes, ms"],
+            [[r["technique"], r["setting"], r["paper_resolution"],
+              "–" if r["paper_fps"] is None else f"{r['paper_fps']:g}{'?' if r['paper_doubtful'] else ''}", r["resolution"],
+              *([r.get(k) for k in ("fps", "ms", "mad", "p95", "still_ms", "ratio", "ratio_per_hardware", "planned_mib", "held_mib")]
+                if r.get("ms") else [r["problem"] or "–", *[""] * 8]),
+              ", ".join(f"{k} {v:.2f}" for k, v in sorted(r["passes"].items(), key=lambda i: -i[1])[:4])] for r in rows],
+        ),
+    ]  # fmt: skip
+    files[2].write_text(document("Quartet Table 2", "".join("–" if b is None else b for b in body), charts=False))
+    return files
+
+
+def hardware_text(c: Calibration) -> str:
+    """The calibration in a sentence."""
+    state = f"varied by {100 * c.variation:.1f} %" + ("" if c.settled else f" still after {c.runs} runs: times are unsettled, trust ratios only")
+    return (
+        f"Calibration kernel {c.milliseconds:.2f} ms ({c.gflops:.1f} GFLOP/s, {c.gbytes:.1f} GB/s), {state}. "
+        f"This machine is {c.ratio:.3g} × the paper's GTX 1070 ({GTX_1070['gflops']:.0f} GFLOP/s, {GTX_1070['gbytes']:.0f} GB/s)."
+    )

@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Self-contained HTML pages: everything they show is in the file, nothing is fetched."""
+
+from __future__ import annotations
+
+import base64
+import html
+import io
+import json
+import math
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from .sheet import srgb
+
+# Okabe and Ito's colours, told apart with any colour vision.
+COLORS = {"RSM": "#0072B2", "LPV": "#009E73", "VCT": "#D55E00", "SSDO": "#CC79A7", "HYBRID": "#E69F00", "AUTO": "#56B4E9",
+          "Cycles": "#555555", "Cycles + OIDN": "#999999", "EEVEE": "#F0E442"}  # fmt: skip
+
+_CSS = """
+:root { color-scheme: light; --line: #d8d8d8; --soft: #f5f5f3; --ink: #1d1d1b; --quiet: #666; }
+* { box-sizing: border-box; }
+body { font: 15px/1.5 system-ui, sans-serif; color: var(--ink); background: #fff; margin: 0 auto; max-width: 1240px; padding: 24px; }
+h1 { font-size: 26px; margin: 0 0 4px; } h2 { margin: 40px 0 8px; border-bottom: 1px solid var(--line); } h3 { margin: 24px 0 6px; }
+p.lead, .quiet { color: var(--quiet); } code { background: var(--soft); padding: 0 4px; border-radius: 3px; }
+table { border-collapse: collapse; margin: 8px 0 16px; font-variant-numeric: tabular-nums; font-size: 13.5px; }
+th, td { padding: 3px 9px; border-bottom: 1px solid var(--line); text-align: right; vertical-align: top; }
+th { background: var(--soft); position: sticky; top: 0; } td:first-child, th:first-child, td.text { text-align: left; }
+.scroll { overflow-x: auto; }
+.pass { color: #11703b; } .fail, .error { color: #b3261e; font-weight: 600; } .nature { color: #8a5a00; font-weight: 600; }
+.na, .reported { color: var(--quiet); }
+nav a { margin-right: 14px; } img { image-rendering: pixelated; max-width: 100%; }
+figure { display: inline-block; margin: 6px 12px 6px 0; } figcaption { color: var(--quiet); font-size: 12.5px; }
+select, input, button { font: inherit; }
+.wipe { position: relative; overflow: hidden; background: #000; touch-action: none; cursor: ew-resize; }
+.wipe img { width: 100%; display: block; } .wipe img.top { position: absolute; inset: 0; clip-path: inset(0 calc(100% - var(--x, 50%)) 0 0); }
+.wipe .bar { position: absolute; top: 0; bottom: 0; left: var(--x, 50%); width: 2px; background: #fff; box-shadow: 0 0 3px #000; pointer-events: none; }
+.wipe .tag { position: absolute; bottom: 6px; padding: 1px 7px; color: #fff; background: #000a; font-size: 12px; pointer-events: none; }
+.wipe .tag.l { left: 6px; } .wipe .tag.r { right: 6px; }
+.cols { display: grid; grid-template-columns: 1fr 1fr; gap: 16px; } @media (max-width: 800px) { .cols { grid-template-columns: 1fr; } }
+"""
+
+
+def esc(text: Any) -> str:
+    return html.escape(str(text))
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """A number for people: significant digits, no exponent where it is readable without."""
+    if value is None or (isinstance(value, float) and math.isnan(value)):
+        return "–"
+    if math.isinf(value):
+        return "∞" if value > 0 else "−∞"
+    if value == 0:
+        return "0"
+    if 1e-4 <= abs(value) < 1e5:
+        places = max(0, digits - 1 - math.floor(math.log10(abs(value))))
+        return f"{value:.{places}f}"
+    return f"{value:.{digits - 1}e}"
+
+
+def finite(value: Any) -> Any:
+    """``value`` as JSON can hold it: numbers that are not finite become None, arrays lists."""
+    if isinstance(value, dict):
+        return {str(k): finite(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [finite(v) for v in value]
+    if isinstance(value, np.ndarray):
+        return finite(value.tolist())
+    if isinstance(value, (float, np.floating)):
+        return float(value) if math.isfinite(value) else None
+    if isinstance(value, np.integer):
+        return int(value)
+    return value
+
+
+def dump(value: Any) -> str:
+    """Strict JSON text."""
+    return json.dumps(finite(value), indent=1, ensure_ascii=False, allow_nan=False)
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
+    """An HTML table; cells are text, or ready HTML where they start with ``<``."""
+    def cell(value: Any) -> str:
+        text = number(value) if value is None or isinstance(value, float) else str(value)
+        inner = text if text.startswith("<") else esc(text)
+        return inner if text.startswith("<td") else f"<td>{inner}</td>"
+
+    lines = ["<div class=scroll><table><thead><tr>", *(f"<th>{esc(h)}</th>" for h in head), "</tr></thead><tbody>"]
+    lines += ["<tr>" + "".join(cell(v) for v in row) + "</tr>" for row in rows]
+    return "".join([*lines, "</tbody></table></div>"])
+
+
+def data_uri(linear: np.ndarray, *, scale: float = 1.0, enlarge: int = 1) -> str:
+    """(H, W, 3) linear, row 0 at the bottom, as an sRGB PNG in a data URI."""
+    return bytes_uri(srgb(linear[::-1, :, :3] * scale), enlarge=enlarge)
+
+
+def bytes_uri(rgb: np.ndarray, *, enlarge: int = 1) -> str:
+    """(H, W, 3) uint8, row 0 at the top, as a PNG in a data URI."""
+    from PIL import Image
+
+    image = Image.fromarray(np.ascontiguousarray(rgb))
+    if enlarge > 1:
+        image = image.resize((image.width * enlarge, image.height * enlarge), Image.Resampling.NEAREST)
+    stream = io.BytesIO()
+    image.save(stream, "PNG", optimize=True)
+    return "data:image/png;base64," + base64.b64encode(stream.getvalue()).decode()
+
+
+def picture(uri: str, caption: str, width: int | None = None) -> str:
+    size = f" width={width}" if width else ""
+    return f'<figure><img src="{uri}" alt="{esc(caption)}"{size}><figcaption>{esc(caption)}</figcaption></figure>'
+
+
+# Anchors of the magma colour map (S. van der Walt and N. Smith, CC0), evenly spaced; linear between them.
+_MAGMA = np.array([
+    (0, 0, 4), (20, 14, 54), (59, 15, 112), (100, 26, 128), (140, 41, 129), (183, 55, 121), (222, 73, 104), (247, 112, 92),
+    (254, 159, 109), (254, 207, 146), (252, 253, 191),
+], float)  # fmt: skip
+
+
+def heat(values: np.ndarray, low: float, high: float) -> np.ndarray:
+    """A map (H, W) on a logarithmic scale as (H, W, 3) uint8, row order kept."""
+    t = (np.log10(np.maximum(values, 1e-12)) - math.log10(low)) / (math.log10(high) - math.log10(low))
+    t = np.clip(np.nan_to_num(t), 0.0, 1.0) * (len(_MAGMA) - 1)
+    i = np.minimum(t.astype(int), len(_MAGMA) - 2)
+    f = (t - i)[..., None]
+    return (_MAGMA[i] * (1 - f) + _MAGMA[i + 1] * f + 0.5).astype(np.uint8)
+
+
+def plotly_source() -> str:
+    """plotly.js, to embed. Raises RuntimeError with what to install."""
+    try:
+        from plotly.offline import get_plotlyjs
+    except ImportError as error:
+        raise RuntimeError("charts need the plotly package: pip install 'quartet-gi[report]'") from error
+    return get_plotlyjs()
+
+
+def chart(figure: Any, name: str) -> str:
+    """A plotly figure as a div and the script that draws it; the page must hold plotly.js."""
+    body = figure.to_json().replace("</", "<\\/")
+    return (
+        f'<div class=chart id="{name}" style="width:100%"></div><script>(function(){{const f={body};'
+        f'Plotly.newPlot("{name}",f.data,f.layout,{{responsive:true,displaylogo:false}})'
+        ".then(()=>{document.body.dataset.charts=(+(document.body.dataset.charts||0)+1)})})()</script>"
+    )
+
+
+def document(title: str, body: str, *, charts: bool, scripts: str = "") -> str:
+    """A whole page."""
+    source = f"<script>{plotly_source()}</script>" if charts else ""
+    return (
+        f'<!doctype html><html lang=en><head><meta charset=utf-8><meta name=viewport content="width=device-width">'
+        f"<title>{esc(title)}</title><style>{_CSS}</style>{source}</head><body>{body}<script>{scripts}</script></body></html>"
+    )

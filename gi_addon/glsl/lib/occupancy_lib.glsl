@@ -1,0 +1,51 @@
+// Rays through the grid of cells. Included where `occupancy`, `cell_origin_ws` and `cell_size` are declared.
+//
+// From cell to cell, or over the largest empty block around (J. Amanatides and A. Woo, "A Fast Voxel Traversal Algorithm
+// for Ray Tracing", Eurographics 1987, with the blocks of an octree). A surface fills every cell it passes through, so a
+// plane's cells reach |nx| + |ny| + |nz| edges to either side of it: a ray that starts that far off never meets its own.
+
+const int CELL_STEPS = 96;
+
+// How far (in cells) the ray may go from `p` within the block that `p` lies in, along `direction` (cells per unit).
+float cell_exit(vec3 p, vec3 inverse, vec3 forward, float size)
+{
+    vec3 corner = floor(p / size) * size;
+    vec3 t = (corner + forward * size - p) * inverse;
+    return min(t.x, min(t.y, t.z));
+}
+
+// A surface's point lifted clear of the cells that the surface fills.
+vec3 cells_clear(vec3 position_ws, vec3 n) { return position_ws + n * (dot(abs(n), vec3(1.0)) * cell_size); }
+
+// Whether something stands between two points, each already lifted off its own surface. A run of cells that holds an end
+// point is that point's own neighbourhood (a corner, a contact), not an obstacle: only what has free cells before and
+// behind it blocks.
+bool cells_block(vec3 from_ws, vec3 to_ws)
+{
+    vec3 start = (from_ws - cell_origin_ws) / cell_size;
+    vec3 along = (to_ws - cell_origin_ws) / cell_size - start;
+    float far = length(along);
+    vec3 direction = along / max(far, 1e-6);
+    direction = mix(direction, vec3(1e-6), lessThan(abs(direction), vec3(1e-6)));
+    vec3 inverse = 1.0 / direction;
+    vec3 forward = step(0.0, direction);
+    ivec3 last = textureSize(occupancy, 0) - 1;
+    float t = 0.0;
+    bool free_before = false;
+    bool inside = false;
+    bool blocked = false;
+    for (int i = 0; i < CELL_STEPS; ++i) {
+        if (t < far && !blocked) {
+            vec3 p = start + direction * t;
+            float level = floor(texelFetch(occupancy, clamp(ivec3(floor(p)), ivec3(0), last), 0).r * 255.0 + 0.5);
+            bool solid = level < 0.5;
+            blocked = !solid && inside;
+            inside = inside || (solid && free_before);
+            free_before = free_before || !solid;
+            t += max(cell_exit(p, inverse, forward, exp2(max(level - 1.0, 0.0))), 0.0) + 1e-3;
+        } else {
+            break;
+        }
+    }
+    return blocked;
+}

@@ -1,0 +1,177 @@
+// Single scattering: L = ∫ T(eye, t) σs p(θ) Σ E(light, t) V T(light, t) dt along the pixel's ray.
+//
+// Every light has its own points on the ray. For one with a place, equiangular ones, pdf ∝ 1/d² (C. Kulla and M. Fajardo,
+// "Importance Sampling Techniques for Path Tracing in Participating Media", EGSR 2012): its own singularity cancels, so a
+// lamp in the fog neither sparkles nor needs a bound. A spot's are within its cone. For parallel light, ∝ T(eye, t).
+
+#include "lib/view_lib.glsl"
+#include "lib/sequence_lib.glsl"
+#include "lib/medium_lib.glsl"
+#if HAS_LIGHTS && HAS_VOLUME_LIGHT
+#include "lib/light_lib.glsl"
+#include "lib/math_lib.glsl"
+
+// Whether light gets to a point of the air: its texel's depth alone, the sub-frames blur it.
+float air_visibility(Light light, vec3 position_ws)
+{
+#if HAS_LIGHT_VIEWS
+    if (light.views <= 0) {
+        return 1.0;
+    }
+    int best = light.first_view;
+    float deepest = -1e30;
+    for (int i = 0; i < light.views; ++i) {
+        float d = dot(position_ws - light_views[light.first_view + i].origin_ws, light_views[light.first_view + i].axis_z);
+        if (d > deepest) {
+            deepest = d;
+            best = light.first_view + i;
+        }
+    }
+    LightView v = light_views[best];
+    vec3 p = light_view_project(v, position_ws);
+    vec2 unit = p.xy / v.guard;
+    if (any(greaterThan(abs(unit), vec2(1.0))) || p.z <= v.near) {
+        return 1.0;
+    }
+    ivec2 texel = ivec2(v.rect.xy + (unit * 0.5 + 0.5) * v.rect.zw);
+    float d = 0.0;
+#if HAS_SHADOW_DEPTH
+    if (v.map == MAP_SHADOW) {
+        d = texelFetch(shadow_depth, texel, 0).r;
+    }
+#endif
+#if HAS_RSM_DEPTH
+    if (v.map == MAP_BOUNCE) {
+        d = texelFetch(rsm_depth, texel, 0).r;
+    }
+#endif
+    return d == 0.0 || d >= p.z ? 1.0 : 0.0;
+#else
+    return 1.0;
+#endif
+}
+
+// The part of [span.x, span.y] that a spot's or an area light's side can reach.
+vec2 lit_span(Light light, vec3 origin_ws, vec3 direction, vec2 span)
+{
+    if (light.kind != LIGHT_SPOT && light.kind != LIGHT_AREA) {
+        return span;
+    }
+    vec3 o = origin_ws - light.position_ws;
+    // In front: o·a + t d·a > 0.
+    float oa = dot(o, light.axis_ws);
+    float da = dot(direction, light.axis_ws);
+    float cross_ = -oa / (abs(da) > 1e-12 ? da : 1e-12);
+    bool wide = light.kind == LIGHT_AREA ? light.spread_tan < 0.0 : light.spot_cos <= 0.0;
+    if (light.kind == LIGHT_AREA || !wide) {
+        span = da > 0.0 ? vec2(max(span.x, cross_), span.y) : vec2(span.x, min(span.y, cross_));
+    }
+    if (wide) {
+        return span;
+    }
+    // The cone z² ≥ c² (x² + y² + z²) in the light's own frame; c from the spread for an area light's patch.
+    mat3 frame = light.kind == LIGHT_AREA ? frame_from_normal(light.axis_ws) : mat3(light.u_ws, light.v_ws, light.axis_ws);
+    float c2 = light.kind == LIGHT_AREA ? 1.0 / (1.0 + sqr(light.spread_tan)) : sqr(light.spot_cos);
+    vec3 p = o * frame;
+    vec3 q = direction * frame;
+    float a = q.z * q.z - c2 * dot(q, q);
+    float b = p.z * q.z - c2 * dot(p, q);
+    float c = p.z * p.z - c2 * dot(p, p);
+    float root2 = b * b - a * c;
+    if (root2 <= 0.0) {
+        return a > 0.0 ? span : vec2(0.0, -1.0); // inside all along, or never
+    }
+    float root = sqrt(root2);
+    float k = -(b + (b >= 0.0 ? root : -root));
+    vec2 t = vec2(k / (abs(a) > 1e-20 ? a : 1e-20), c / (abs(k) > 1e-20 ? k : 1e-20));
+    t = vec2(min(t.x, t.y), max(t.x, t.y));
+    // a < 0: inside between the roots. a > 0: beyond one of them; the other belongs to the cone's mirror image, which the
+    // half space in front has cut off.
+    if (a < 0.0) {
+        return vec2(max(span.x, t.x), min(span.y, t.y));
+    }
+    return da > 0.0 ? vec2(max(span.x, t.y), span.y) : vec2(span.x, min(span.y, t.x));
+}
+
+vec3 scattered(Light light, vec3 origin_ws, vec3 direction, vec2 span, float offset)
+{
+    span = lit_span(light, origin_ws, direction, span);
+    if (span.y <= span.x) {
+        return vec3(0.0);
+    }
+    bool parallel = light_is_directional(light);
+    // Equiangular: t = δ + D tan φ, pdf = D / ((φb − φa)(D² + (t − δ)²)), δ the ray's nearest point to the light.
+    vec3 to_light = light.position_ws - origin_ws;
+    float delta = dot(to_light, direction);
+    float nearest = max(length(to_light - direction * delta), 1e-6 * view.scene_radius);
+    float phi_a = atan((span.x - delta) / nearest);
+    float phi_b = span.y >= 1e29 ? 0.5 * PI : atan((span.y - delta) / nearest);
+    float sigma = max(vector_mean(medium_extinction), 1e-12);
+    float passed = 1.0 - exp(-sigma * (span.y - span.x));
+    vec3 sum = vec3(0.0);
+    for (int k = 0; k < step_count; ++k) {
+        float u = (float(k) + offset) / float(step_count);
+        float t, weight;
+        if (parallel) {
+            float rest = max(1.0 - u * passed, 1e-7);
+            t = span.x - log(rest) / sigma;
+            weight = passed / (sigma * rest);
+        } else {
+            float tangent = tan(mix(phi_a, phi_b, u));
+            t = delta + nearest * tangent;
+            weight = (phi_b - phi_a) * nearest * (1.0 + tangent * tangent);
+        }
+        vec3 p = origin_ws + direction * t;
+        vec3 l;
+        float angle;
+        vec3 arriving = light_arriving(light, p, l, angle);
+        if (max3(arriving) > 0.0) {
+            float reach = parallel ? 1e30 : length(light.position_ws - p);
+            vec3 left = medium_transmittance(p, l, reach) * exp(-medium_extinction * (t - max(span.x, 0.0)));
+            // The span begins where the light's part of the ray does, not where the medium does.
+            sum += arriving * left * (weight * air_visibility(light, p) *
+                                      henyey_greenstein(dot(l, direction), medium_anisotropy));
+        }
+    }
+    return sum * medium_transmittance(origin_ws, direction, span.x) / float(step_count);
+}
+#endif
+
+void main()
+{
+    ivec2 pixel = ivec2(gl_FragCoord.xy);
+    vec2 uv = gl_FragCoord.xy * view.inverse_resolution;
+    float depth = 0.0;
+#if HAS_GBUF_DEPTH
+    depth = texelFetch(gbuf_depth, pixel, 0).r;
+#endif
+    vec3 ray = ray_direction_ws(uv);
+    float scale = length(ray);
+    vec3 direction = ray / scale;
+    vec3 origin_ws = ray_origin_ws(uv) + ray * view.clip_start;
+    float end = depth > 0.0 ? (depth - view.clip_start) * scale : 1e30;
+    vec2 span = medium_span(origin_ws, direction);
+    span = vec2(max(span.x, 0.0), min(span.y, end));
+    float length_ = max(span.y - span.x, 0.0);
+    vec3 passes = exp(-medium_extinction * length_);
+#if HAS_VOLUME_TRANSMITTANCE
+    volume_transmittance = vec4(passes, 1.0);
+#endif
+#if HAS_VOLUME_LIGHT
+    // Emission: ∫ ε T dt = ε (1 − T)/σ.
+    vec3 emitted = mix((1.0 - passes) / max(medium_extinction, vec3(1e-12)), vec3(length_),
+                       lessThan(medium_extinction * length_, vec3(1e-4)));
+    vec3 light_sum = vec3(0.0);
+#if HAS_LIGHTS
+    float offset = fract(step_turn + unit_float(hash_u32(uvec2(pixel + view.pixel_offset))));
+    if (length_ > 0.0 && max3(medium_scattering) > 0.0) {
+        for (int i = 0; i < light_count; ++i) {
+            light_sum += scattered(lights[i], origin_ws, direction, span, offset);
+        }
+    }
+#endif
+    bool glows = any(greaterThan(medium_emission, vec3(0.0)));
+    volume_light = vec4(light_sum * medium_scattering + (glows ? medium_emission * emitted : vec3(0.0)),
+                        dot(passes, vec3(1.0 / 3.0)));
+#endif
+}

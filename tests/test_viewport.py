@@ -1,0 +1,345 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The rendered viewport: in a window of the real Blender, and its parts without one."""
+
+from __future__ import annotations
+
+import types
+
+import numpy as np
+import pytest
+from conftest import make
+from real_blender import run_window
+
+from gi_addon.compare import scenes
+from gi_addon.gl import Cancelled, CancelToken
+from gi_addon.renderer import Renderer
+from gi_addon.settings import Settings
+
+SQUARES = ((0.02, 0.02, 0.02), (0.18, 0.18, 0.18), (0.5, 0.1, 0.05), (0.7, 0.7, 0.7), (3.0, 2.0, 0.5), (8.0, 8.0, 8.0))
+
+# One session does what a user does in ten minutes; each test looks at one part of its report.
+_SESSION = """
+def steps():
+    from gi_addon.gl import shared
+    from gi_addon.host import viewport
+    out = {}
+    scene = studio()
+    area, space, region = view()
+    window = bpy.context.window_manager.windows[0]
+    space.shading.type = "RENDERED"
+    space.region_3d.view_perspective = "CAMERA"
+    yield 0.3
+    yield settled
+    v = viewport.viewports()[0]
+    def snap(name):
+        shown = viewport.viewports()
+        out[name] = dict(v.counts, sync=v._sync.counts, size=v._request.size,
+            instances=[len(x._scene.instances) for x in shown], viewports=len(shown),
+            bytes=shared().call(lambda gl: gl.bytes()), border=v._request.border)
+    def changed(name):
+        yield 0.15
+        yield settled
+        snap(name)
+    def here():
+        return bpy.context.temp_override(window=window, area=area, region=region)
+    snap("start")
+    scene.objects["White"].select_set(True)
+    yield from changed("select")
+    scene.objects["White"].location.x += 0.3
+    yield from changed("move")
+    bpy.data.materials["White"].node_tree.nodes["Principled BSDF"].inputs["Base Color"].default_value = (0.1, 0.8, 0.1, 1.0)
+    yield from changed("material")
+    bpy.data.lights["Spot"].energy = 400.0
+    yield from changed("light")
+    mesh = scene.objects["White"].data
+    mesh.vertices[0].co.x -= 0.3
+    mesh.update()
+    yield from changed("mesh")
+    scene.objects["Red"].hide_set(True)
+    yield from changed("hide")
+    scene.objects["Red"].hide_set(False)
+    yield from changed("unhide")
+    with here():
+        bpy.context.view_layer.objects.active = scene.objects["Red"]
+        for o in scene.objects:
+            o.select_set(o.name == "Red")
+        bpy.ops.view3d.localview(frame_selected=False)
+    yield from changed("local view")
+    with here():
+        bpy.ops.view3d.localview(frame_selected=False)
+        bpy.ops.object.mode_set(mode="EDIT")
+        bpy.ops.mesh.select_all(action="SELECT")
+        bpy.ops.transform.translate(value=(-5.0, 0.0, 0.0))
+    yield from changed("edit mode")
+    out["edited to"] = float(v._scene.bounds()[0][0])
+    with here():
+        bpy.ops.object.mode_set(mode="OBJECT")
+    yield from changed("object mode")
+    subprocess.run("xdotool search --onlyvisible --name Blender windowsize 640 440", shell=True)
+    yield 0.3
+    yield from changed("resize")
+    scene.render.use_border = True
+    scene.render.border_min_x, scene.render.border_max_x = 0.25, 0.75
+    scene.render.border_min_y, scene.render.border_max_y = 0.25, 0.75
+    yield from changed("border")
+    scene.render.use_border = False
+    with here():
+        bpy.ops.ed.undo_push(message="before")
+        scene.objects["White"].location.z += 2.0
+        bpy.ops.ed.undo_push(message="after")
+    yield from changed("raised")
+    out["raised to"] = float(v._scene.bounds()[1][2])
+    with here():
+        bpy.ops.ed.undo()
+    yield from changed("undo")
+    out["undone to"] = float(v._scene.bounds()[1][2])
+    scene = bpy.context.scene
+    with here():
+        bpy.ops.screen.area_split(direction="VERTICAL", factor=0.5)
+    for a in window.screen.areas:
+        if a.type == "VIEW_3D":
+            a.spaces.active.shading.type = "RENDERED"
+    yield 0.3
+    yield from changed("two viewports")
+    shot({shot!r})
+    done = []
+    bpy.app.handlers.render_complete.append(lambda *_: done.append(True))
+    scene.render.resolution_x, scene.render.resolution_y, scene.quartet.samples = 160, 90, 4
+    bpy.ops.render.render("INVOKE_DEFAULT")
+    for _ in range(5):
+        bpy.data.objects["White"].location.x -= 0.05
+        yield 0.05
+    def rendered():
+        return bool(done)
+    yield rendered
+    yield from changed("final render meanwhile")
+    bpy.data.objects.remove(bpy.data.objects["Red"])
+    yield from changed("delete")
+    start = shared().call(lambda gl: gl.bytes())
+    for i in range(25):
+        bpy.data.objects["White"].location.x = 0.02 * i
+        bpy.data.materials["White"].node_tree.nodes["Principled BSDF"].inputs["Roughness"].default_value = i / 25.0
+        yield 0.02
+    yield from changed("25 updates")
+    out["grown"] = shared().call(lambda gl: gl.bytes()) - start
+    scene.render.engine = "BLENDER_WORKBENCH"
+    yield 0.5
+    out["other engine"] = dict(viewports=len(viewport.viewports()), bytes=shared().call(lambda gl: gl.bytes()))
+    scene.render.engine = "QUARTET"
+    yield 0.3
+    yield settled
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=False)
+    yield 0.5
+    out["new file"] = dict(viewports=len(viewport.viewports()), bytes=shared().call(lambda gl: gl.bytes()))
+    bpy.context.scene.render.engine = "QUARTET"
+    view()[1].shading.type = "RENDERED"
+    yield 0.3
+    yield settled
+    out["default cube"] = len(viewport.viewports()[0]._scene.instances)
+    gi_addon.unregister()
+    yield 0.3
+    out["unregistered"] = len(viewport.viewports())
+    report(**out)
+"""
+
+# Squares that shine by themselves, in Quartet and in Cycles under the same view transforms.
+_COLORS = """
+COLORS = {colors!r}
+def steps():
+    from gi_addon.host.compat import node_tree
+    scene = studio()
+    for o in list(bpy.data.objects):
+        if o.type != "CAMERA":
+            bpy.data.objects.remove(o)
+    camera = scene.camera
+    camera.location, camera.rotation_euler = (0, 0, 10), (0, 0, 0)
+    camera.data.type, camera.data.ortho_scale = "ORTHO", 8
+    for i, color in enumerate(COLORS):
+        bpy.ops.mesh.primitive_plane_add(size=1.2, location=(-2.2 + 2.2 * (i % 3), 1 - 2 * (i // 3), 0))
+        material = bpy.data.materials.new("light")
+        tree = node_tree(material)
+        tree.nodes.clear()
+        emission, output = tree.nodes.new("ShaderNodeEmission"), tree.nodes.new("ShaderNodeOutputMaterial")
+        tree.links.new(emission.outputs[0], output.inputs[0])
+        emission.inputs[0].default_value = (*color, 1)
+        bpy.context.object.data.materials.append(material)
+    area, space, region = view()
+    space.overlay.show_overlays = space.show_gizmo = False
+    space.shading.type, space.region_3d.view_perspective = "RENDERED", "CAMERA"
+    scene.cycles.preview_samples, scene.cycles.device = 2, "CPU"
+    from bpy_extras.view3d_utils import location_3d_to_region_2d as place
+    for transform in ("AgX", "Standard"):
+        scene.view_settings.view_transform = transform
+        scene.render.engine = "QUARTET"
+        yield 0.3
+        yield settled
+        yield 0.2
+        shot({folder!r} + "/quartet-" + transform + ".png")
+        scene.render.engine = "CYCLES"
+        yield 1.5
+        shot({folder!r} + "/cycles-" + transform + ".png")
+    points = [place(region, space.region_3d, o.location) for o in scene.objects if o.type == "MESH"]
+    points.append(place(region, space.region_3d, (0, 0, 0)))
+    height = bpy.context.window_manager.windows[0].height
+    report(points=[(region.x + p.x, height - 1 - region.y - p.y) for p in points])
+"""
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory):
+    """The report of one long session in a window with OpenGL."""
+    folder = tmp_path_factory.mktemp("viewport")
+    return run_window(_SESSION.replace("{shot!r}", repr(str(folder / "two.png"))), folder, size="720x500")
+
+
+def sent(session, before, after):
+    """Kinds of data that went to the GPU between two moments of the session."""
+    kinds = ("meshes", "transforms", "materials", "images")
+    return {k for k in kinds if session[after].get(f"sent {k}", 0) > session[before].get(f"sent {k}", 0)}
+
+
+@pytest.mark.realblender
+@pytest.mark.parametrize(
+    ("change", "before", "meshes", "kinds"),
+    [
+        ("move", "select", 0, {"transforms"}),
+        ("material", "move", 0, {"materials"}),
+        ("light", "material", 0, set()),
+        ("mesh", "light", 1, {"meshes", "transforms"}),
+    ],
+)
+def test_only_what_changed_is_read_and_sent(session, change, before, meshes, kinds):
+    """Meshes read from Blender, and kinds of data sent to the GPU, after one change each."""
+    assert session[change]["sync"]["meshes"] == meshes
+    assert sent(session, before, change) == kinds
+
+
+@pytest.mark.realblender
+def test_selecting_starts_nothing_over(session):
+    assert session["select"]["restarts"] == session["start"]["restarts"]
+    assert session["select"]["subframes"] == session["start"]["subframes"]
+
+
+@pytest.mark.realblender
+def test_resizing_touches_targets_only(session):
+    before, after = session["object mode"], session["resize"]
+    assert after["size"] != before["size"]
+    assert after["reads"] == before["reads"] and not sent(session, "object mode", "resize")
+
+
+@pytest.mark.realblender
+def test_the_viewport_shows_what_the_space_shows(session):
+    """Hidden objects, local view, edit mode and the render border count."""
+    assert session["hide"]["instances"] == [2] and session["unhide"]["instances"] == [3]
+    assert session["local view"]["instances"] == [1]
+    assert session["edit mode"]["instances"] == [3] and session["edited to"] < -6.0
+    x, y, width, height = session["border"]["border"]
+    assert x > 0 and y > 0 and width < session["border"]["size"][0] / 2 and height < session["border"]["size"][1] / 2
+
+
+@pytest.mark.realblender
+def test_nothing_stale_stays_after_undo_and_deletion(session):
+    assert session["raised to"] > 2.5 and session["undone to"] < session["raised to"] - 0.5
+    assert set(session["delete"]["instances"]) == {2}
+
+
+@pytest.mark.realblender
+def test_two_viewports_and_a_final_render_live_together(session):
+    assert session["two viewports"]["viewports"] == 2
+    assert session["final render meanwhile"]["viewports"] == 2
+
+
+@pytest.mark.realblender
+def test_memory_stays_flat_and_is_given_back(session):
+    """25 changes allocate nothing that stays; another engine, another file and unregistering free all."""
+    assert session["grown"] == 0
+    for after in ("other engine", "new file"):
+        assert session[after] == {"viewports": 0, "bytes": 0}
+    assert session["default cube"] == 1 and session["unregistered"] == 0
+
+
+@pytest.mark.realblender
+@pytest.mark.parametrize("backend", ["opengl", "vulkan"])
+def test_colours_are_cycles_own(tmp_path, backend):
+    """What shines with a known radiance has Cycles' colour on the screen, for two view transforms: within 1 of 255, the
+    rounding of half floats and of the display."""
+    pillow = pytest.importorskip("PIL.Image")
+    script = _COLORS.replace("{colors!r}", repr(SQUARES)).replace("{folder!r}", repr(str(tmp_path)))
+    points = run_window(script, tmp_path, "--gpu-backend", backend, size="720x500")["points"]
+    for transform in ("AgX", "Standard"):
+        ours, theirs = (
+            np.asarray(pillow.open(tmp_path / f"{engine}-{transform}.png").convert("RGB")).astype(int)
+            for engine in ("quartet", "cycles")
+        )
+        seen = [theirs[round(y), round(x)] for x, y in points]
+        assert len({tuple(color) for color in seen}) == len(points), "the squares are not where they should be"
+        for (x, y), color in zip(points, seen, strict=True):
+            assert np.abs(ours[round(y), round(x)] - color).max() <= 1, f"{transform}: {ours[round(y), round(x)]} {color}"
+
+
+# --- without a window -------------------------------------------------------------------------------------------------
+
+
+def _free_view(view_matrix, window_matrix, perspective="ORTHO"):
+    return types.SimpleNamespace(view_matrix=view_matrix, window_matrix=window_matrix, view_perspective=perspective)
+
+
+@pytest.mark.blender
+def test_a_free_orthographic_view_steps_back_until_nothing_is_behind_it(blender):
+    """Blender puts the eye of such a view in the middle of things. Stepping back by s moves every depth by s and no
+    point's place on the screen."""
+    from gi_addon.host.viewport import view_camera
+
+    scene = scenes.cornell()
+    near, far = -1000.0, 1000.0
+    window = np.diag([0.2, 0.3, -2.0 / (far - near), 1.0])
+    window[2, 3] = -(far + near) / (far - near)
+    camera = view_camera(_free_view(np.eye(4), window), scene, (64, 36))
+    corners = scene.bounds()
+    depth = camera.world_from_view[2, 3] - corners[:, 2]
+    assert depth.min() > 0.0 and 0.0 < camera.clip_start < depth.min() < depth.max() < camera.clip_end
+    for point in corners:
+        old = window @ np.append(point, 1.0)
+        new = camera.clip_from_view @ np.linalg.inv(camera.world_from_view) @ np.append(point, 1.0)
+        assert new[:2] == pytest.approx(old[:2]) and new[2] == pytest.approx(old[2], abs=1e-9)
+
+
+@pytest.mark.blender
+def test_a_perspective_view_keeps_its_clip_planes(blender):
+    from gi_addon.host.viewport import view_camera
+
+    near, far = 0.05, 200.0
+    window = np.diag([1.5, 2.0, -(far + near) / (far - near), 0.0])
+    window[2, 3], window[3, 2] = -2.0 * far * near / (far - near), -1.0
+    camera = view_camera(_free_view(np.eye(4), window, "PERSP"), scenes.cornell(), (64, 36))
+    assert (camera.clip_start, camera.clip_end) == (pytest.approx(near), pytest.approx(far, rel=1e-4))
+
+
+def test_a_sub_frame_given_up_half_way_leaves_no_stale_maps(gl):
+    """Cancelled after the first pass, then rendered: the same picture as without."""
+    scene = scenes.cornell()
+    expected = make(scene, samples=1, resolution=(48, 27)).passes["Combined"]
+
+    class AfterOnePass(CancelToken):
+        asked = 0
+
+        @property
+        def cancelled(self):
+            self.asked += 1
+            return self.asked > 3
+
+    def job(context):
+        renderer = Renderer(context)
+        try:
+            settings = Settings()
+            settings.samples = 1
+            renderer.begin(scene, settings, resolution=(48, 27))
+            with pytest.raises(Cancelled):
+                renderer.subframe(0, AfterOnePass())
+            renderer.begin(scene, settings, resolution=(48, 27))
+            renderer.subframe(0)
+            return renderer.film()["combined"]
+        finally:
+            renderer.close()
+
+    assert np.array_equal(gl(job), expected)
