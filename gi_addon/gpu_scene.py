@@ -249,6 +249,11 @@ class GPUScene:
 
     # -- drawing -------------------------------------------------------------------------------------------------
 
+    @property
+    def scene(self) -> Scene | None:
+        """What was synced last."""
+        return self._scene
+
     def draw(self, planned: Planned, stages, visibility: int, clip_from_world: np.ndarray, **options) -> None:
         """Draw surfaces that ``visibility`` rays see, each with its material's function.
 

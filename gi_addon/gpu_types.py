@@ -56,7 +56,7 @@ LIGHT_VIEW = struct(
 # A virtual point light: `flux` (W) reflected by a disc of `area` (m²) at `position_ws` facing `normal_ws`.
 VPL = struct(
     ("position_ws", "f4", 3), ("area", "f4"),
-    ("normal_ws", "f4", 3), ("light", "i4"),  # that lit it, in rsm.lights
+    ("normal_ws", "f4", 3), ("light", "i4"),  # that lit it, in rsm.lights; −1 another virtual light
     ("flux", "f4", 3), ("_pad", "f4"),
 )  # fmt: skip
 

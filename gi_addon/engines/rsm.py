@@ -15,10 +15,11 @@ from ..graph import Buffer, Optional, Pass, Planned, Texture, Uniform
 from ..passes.ao import AOBlur, AOGeneration
 from ..passes.brdf_tables import BRDFTables
 from ..passes.direct_lighting import DirectLighting
-from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentTint, _screen, gather_size
+from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint, _screen, gather_size
 from ..passes.lights import LightList, RSMGeneration, ShadowMaps
 from ..passes.occupancy import CELL_UNIFORMS, Occupancy, set_cells
 from ..passes.resolve import Resolve
+from ..passes.surface_points import SETS, SurfacePoints, points_per_subframe
 from ..passes.volumetric import MEDIUM_UNIFORMS, Volumetric, medium_defines, set_medium
 from ..settings import Settings
 
@@ -31,16 +32,22 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         ShadowMaps(),
         RSMGeneration(),
         RSMFlux(),
-        RSMSamplingPattern(),
         Occupancy(),
+        SurfacePoints(),
+        RSMSamplingPattern(settings),
         GBuffer(),
+        TranslucentLayer(),
+        TranslucentBack(),
         TranslucentTint(),
         GBufferMips(),
         AOGeneration(),
         AOBlur(),
-        InterpolatedIndirect(),
-        IndirectLighting(),
+        InterpolatedIndirect(settings),
+        IndirectLighting(settings),
+        Subsurface(),
         DirectLighting(),
+        GlossyReflections(),
+        Refraction(),
         Volumetric(),
         Resolve(layers),
     ]
@@ -52,9 +59,15 @@ def _bounce_off(facts: Facts) -> str | None:
     return "bounces is 0" if facts.settings.bounces == 0 else None
 
 
-def _gather_defines(facts: Facts) -> dict[str, int]:
+def _gather_defines(facts: Facts, *, always: bool = False) -> dict[str, int]:
     lamps = any(s.kind == LIGHT_MESH for s in facts.rig.sources)
-    return {"GATHER_SCALE": facts.settings.gather_scale, "MESH_LIGHTS": int(lamps), **medium_defines(facts)}
+    untested = {"HAS_OCCUPANCY": 0} if facts.settings.rsm.visibility == "NONE" and not always else {}
+    return {"GATHER_SCALE": facts.settings.gather_scale, "MESH_LIGHTS": int(lamps), **medium_defines(facts), **untested}
+
+
+def vpl_count(facts: Facts) -> int:
+    """Virtual point lights of all bounces."""
+    return facts.settings.rsm.samples + max(facts.settings.bounces - 1, 0) * points_per_subframe(facts)
 
 
 class RSMFlux(Pass):
@@ -118,18 +131,29 @@ class RSMSamplingPattern(Pass):
     reads = ("rsm.flux", "rsm.depth", "rsm.albedo", "rsm.normal", "rsm.lights", "rsm.views")
     writes = (
         Buffer("vpls", "vpls", "virtual point lights of this sub-frame", "Vpl", VPL,
-               lambda f: f.settings.rsm.samples),
+               vpl_count),
     )  # fmt: skip
     uniforms = (
-        Uniform("vpl_count", "int", "how many to draw"),
+        Uniform("vpl_count", "int", "how many to draw; for the next bounce: where the last one's end"),
         Uniform("view_count", "int", "views in the list"),
         Uniform("levels", "int", "levels of the flux pyramid above the texels"),
+        Uniform("bounce_first", "int", "the first light of the bounce before"),
+        Uniform("point_first", "int", "the sub-frame's first surface point"),
+        Uniform("point_count", "int", "surface points of a bounce"),
         *MEDIUM_UNIFORMS,
+        *CELL_UNIFORMS,
     )
-    shaders = {"main": {"compute": "engines/rsm/vpls_comp.glsl"}}
+    shaders = {
+        "main": {"compute": "engines/rsm/vpls_comp.glsl"},
+        "bounce": {"compute": "engines/rsm/bounce_comp.glsl"},
+    }
+
+    def __init__(self, settings: Settings) -> None:
+        if settings.bounces > 1:
+            self.reads = _tested((*type(self).reads, "surface.points"), settings)
 
     def defines(self, facts: Facts) -> dict[str, int]:
-        return medium_defines(facts)
+        return _gather_defines(facts)
 
     def run(self, frame: Frame, planned: Planned) -> None:
         program = frame.program(planned)
@@ -143,6 +167,28 @@ class RSMSamplingPattern(Pass):
             levels=max(facts.rig.bounce.size).bit_length() - 1,
         )
         frame.compute(planned, program, (count,), (64,))
+        if facts.settings.bounces > 1:
+            self._more_bounces(frame, planned, count)
+
+    @staticmethod
+    def _more_bounces(frame: Frame, planned: Planned, count: int) -> None:
+        program = frame.program(planned, "bounce")
+        facts = planned.facts
+        points = points_per_subframe(facts)
+        sets = min(facts.subframes, SETS)
+        set_medium(frame, program, facts)
+        set_cells(frame, program, facts)
+        first = 0
+        for _ in range(facts.settings.bounces - 1):
+            frame.set(program, vpl_count=count, bounce_first=first, point_count=points,
+                      point_first=frame.subframe % sets * points)
+            frame.compute(planned, program, (points,), (64,))
+            first, count = count, count + points
+
+
+def _tested(reads: tuple, settings: Settings) -> tuple:
+    """``reads`` with the cells, where visibility is tested."""
+    return reads if settings.rsm.visibility == "NONE" else (Optional("occupancy"), *reads)
 
 
 class InterpolatedIndirect(Pass):
@@ -150,7 +196,7 @@ class InterpolatedIndirect(Pass):
 
     title = "RSM Interpolated Indirect Lighting Computation"
     figure = "RSM Interpolated Indirect Lighting Computation"
-    reads = ("vpls", "rsm.lights", Optional("occupancy"), "gbuffer.low_depth", "gbuffer.low_normal", "gbuffer.low_pixel")
+    reads = ("vpls", "rsm.lights", "gbuffer.low_depth", "gbuffer.low_normal", "gbuffer.low_pixel")
     writes = (
         Texture("indirect.low", "low_indirect", "radiance a white Lambert surface would reflect, W/(m²·sr)", "rgba32f",
                 gather_size, scratch=True),
@@ -160,6 +206,9 @@ class InterpolatedIndirect(Pass):
     uniforms = (Uniform("vpl_count", "int", "virtual point lights in the list"), *CELL_UNIFORMS, *MEDIUM_UNIFORMS)
     shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/rsm/gather_low_frag.glsl"}}
 
+    def __init__(self, settings: Settings) -> None:
+        self.reads = _tested(type(self).reads, settings)
+
     def defines(self, facts: Facts) -> dict[str, int]:
         return _gather_defines(facts)
 
@@ -168,7 +217,7 @@ class InterpolatedIndirect(Pass):
 
     def run(self, frame: Frame, planned: Planned) -> None:
         program = frame.program(planned)
-        frame.set(program, vpl_count=planned.facts.settings.rsm.samples)
+        frame.set(program, vpl_count=vpl_count(planned.facts))
         set_cells(frame, program, planned.facts)
         set_medium(frame, program, planned.facts)
         frame.screen(planned, program)
@@ -180,7 +229,7 @@ class IndirectLighting(Pass):
     title = "RSM Lighting Computation"
     figure = "RSM Lighting Computation"
     reads = (
-        "vpls", "rsm.lights", Optional("occupancy"), "gbuffer.depth", "gbuffer.normal", Optional("gbuffer.low_depth"),
+        "vpls", "rsm.lights", "gbuffer.depth", "gbuffer.normal", Optional("gbuffer.low_depth"),
         Optional("gbuffer.low_normal"), Optional("gbuffer.low_pixel"), Optional("indirect.low"),
         Optional("indirect.low_direction"), Optional("ao"),
     )  # fmt: skip
@@ -191,12 +240,110 @@ class IndirectLighting(Pass):
     uniforms = (Uniform("vpl_count", "int", "virtual point lights in the list"), *CELL_UNIFORMS, *MEDIUM_UNIFORMS)
     shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/rsm/lighting_frag.glsl"}}
 
+    def __init__(self, settings: Settings) -> None:
+        self.reads = _tested(type(self).reads, settings)
+
     def defines(self, facts: Facts) -> dict[str, int]:
         return _gather_defines(facts)
 
     def run(self, frame: Frame, planned: Planned) -> None:
         program = frame.program(planned)
-        frame.set(program, vpl_count=planned.facts.settings.rsm.samples)
+        frame.set(program, vpl_count=vpl_count(planned.facts))
         set_cells(frame, program, planned.facts)
         set_medium(frame, program, planned.facts)
+        frame.screen(planned, program)
+
+
+_RAY_READS = (
+    "occupancy", "rsm.depth", "rsm.normal", "rsm.albedo", "rsm.lights", "rsm.views", "gbuffer.depth", "gbuffer.normal",
+    Optional("vpls"), Optional("gbuffer.emission", ("transmission.indirect",)), Optional("gbuffer.diffuse"), Optional("direct.diffuse"), Optional("indirect.diffuse"),
+)  # fmt: skip
+_RAY_UNIFORMS = (
+    *CELL_UNIFORMS,
+    *MEDIUM_UNIFORMS,
+    Uniform("rsm_light_count", "int", "lights with reflective shadow maps"),
+    Uniform("vpl_count", "int", "virtual point lights in the list"),
+)
+
+
+def _set_ray(frame: Frame, program, facts: Facts) -> None:
+    set_cells(frame, program, facts)
+    set_medium(frame, program, facts)
+    frame.set(program, rsm_light_count=len(facts.rig.sources), vpl_count=vpl_count(facts))
+
+
+class GlossyReflections(Pass):
+    """What glossy surfaces mirror of lit surfaces: a ray per pixel, cast in the RSMs."""
+
+    title = "RSM Glossy Reflections"
+    figure = "Ray Casting in RSM"
+    reads = (*_RAY_READS, "gbuffer.specular", "gbuffer.lobe", "brdf.energy", "brdf.average")
+    writes = (
+        Texture("indirect.glossy", "indirect_glossy", "radiance reflected by the glossy lobe, W/(m²·sr)", "rgba32f", _screen),
+    )  # fmt: skip
+    uniforms = _RAY_UNIFORMS
+    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/rsm/glossy_frag.glsl"}}
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return _gather_defines(facts, always=True)
+
+    def absent(self, facts: Facts) -> str | None:
+        return None if facts.settings.use_glossy else "glossy reflections are switched off"
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        program = frame.program(planned)
+        _set_ray(frame, program, planned.facts)
+        frame.screen(planned, program)
+
+
+class Refraction(Pass):
+    """What is seen through refracting surfaces: a refracted ray per pixel, cast in the RSMs, which hold no such surface."""
+
+    title = "RSM Translucency"
+    figure = "Ray Casting in RSM"
+    reads = (
+        *_RAY_READS, "gbuffer.transmission", "translucent.depth", "translucent.normal",
+        "translucent.color", "translucent.medium", "translucent.back_depth", "translucent.back_normal",
+    )  # fmt: skip
+    writes = (
+        Texture("transmission.indirect", "transmission_indirect", "radiance through refracting surfaces, tinted; alpha 1 "
+                "where the ray found something", "rgba32f", _screen),
+    )  # fmt: skip
+    uniforms = _RAY_UNIFORMS
+    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/rsm/refraction_frag.glsl"}}
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return _gather_defines(facts, always=True)
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        program = frame.program(planned)
+        _set_ray(frame, program, planned.facts)
+        frame.screen(planned, program)
+
+
+class Subsurface(Pass):
+    """Light scattered below surfaces, from where it entered: the RSM's depth as a translucent shadow map."""
+
+    title = "RSM Subsurface Scattering"
+    reads = (
+        "rsm.depth", "rsm.normal", "rsm.albedo", "rsm.lights", "rsm.views", "gbuffer.depth", "gbuffer.diffuse",
+        "gbuffer.subsurface",
+    )  # fmt: skip
+    writes = (
+        Texture("direct.subsurface", "direct_subsurface", "radiance as direct.diffuse, of light that entered around the "
+                "point; share of the diffuse albedo it is for", "rgba32f", _screen),
+    )  # fmt: skip
+    uniforms = (*MEDIUM_UNIFORMS, Uniform("rsm_light_count", "int", "lights with reflective shadow maps"))
+    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/rsm/subsurface_frag.glsl"}}
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return medium_defines(facts)
+
+    def absent(self, facts: Facts) -> str | None:
+        return None if facts.settings.use_translucency else "translucency is switched off"
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        program = frame.program(planned)
+        set_medium(frame, program, planned.facts)
+        frame.set(program, rsm_light_count=len(planned.facts.rig.sources))
         frame.screen(planned, program)

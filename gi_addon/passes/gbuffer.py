@@ -100,6 +100,27 @@ class TranslucentLayer(Pass):
         _draw_translucent(frame, planned, clear=0.0, mode=moderngl.DEPTH_TEST)
 
 
+class TranslucentBack(Pass):
+    """The farthest refracting surface of each pixel before the opaque one."""
+
+    title = "Transparency Back Generation"
+    reads = TranslucentLayer.reads
+    writes = (
+        Texture("translucent.back_depth", "translucent_back_depth", "its view depth, world units; 0 where there is none",
+                "r32f", _screen),
+        Texture("translucent.back_normal", "translucent_back_normal", "its normals, as gbuffer.normal", "rgba16", _screen),
+        Texture("translucent.back_z", "translucent_back_z", "depth buffer", "depth24", _screen, scratch=True),
+    )  # fmt: skip
+
+    def absent(self, facts: Facts) -> str | None:
+        return _nothing_refracts(facts)
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        frame.gl.ctx.depth_func = ">"
+        _draw_translucent(frame, planned, clear=0.0, mode=moderngl.DEPTH_TEST, shader="translucent_back", far=0.0)
+        frame.gl.ctx.depth_func = "<"
+
+
 class TranslucentTint(Pass):
     """The tint of all refracting surfaces down to the opaque one: each multiplies what is behind it."""
 
@@ -128,17 +149,19 @@ def _nothing_refracts(facts: Facts) -> str | None:
     return None if facts.transmissive else "no visible material refracts"
 
 
-def _draw_translucent(frame: Frame, planned: Planned, *, clear: float, mode: int) -> None:
+def _draw_translucent(
+    frame: Frame, planned: Planned, *, clear: float, mode: int, shader: str = "translucent", far: float = 1.0
+) -> None:
     fbo = frame.targets(planned)
     fbo.use()
     fbo.scissor = None
     fbo.viewport = (0, 0, *fbo.size)
-    fbo.clear(clear, clear, clear, clear, depth=1.0)
+    fbo.clear(clear, clear, clear, clear, depth=far)
     frame.gl.ctx.enable_only(mode)
     frame.bind(planned)
     frame.gpu.draw(
         planned,
-        {"vertex": "surface/surface_vert.glsl", "fragment": "passes/translucent_frag.glsl"},
+        {"vertex": "surface/surface_vert.glsl", "fragment": f"passes/{shader}_frag.glsl"},
         CAMERA,
         np.ascontiguousarray(frame.view["clip_from_world"]),
         full=True,

@@ -72,14 +72,12 @@ class Occupancy(Pass):
         "levels": {"compute": "passes/occupancy_levels_comp.glsl"},
     }
     depends = ("transforms", "meshes", "materials")
-    settings = ("rsm.visibility", "rsm.visibility_resolution")
+    settings = ("rsm.visibility_resolution",)
 
     def rate(self, facts: Facts) -> str:
         return "static"
 
     def absent(self, facts: Facts) -> str | None:
-        if facts.settings.rsm.visibility == "NONE":
-            return "virtual lights are not tested for visibility"
         return None if facts.triangles else "the scene has no surfaces"
 
     def run(self, frame: Frame, planned: Planned) -> None:

@@ -49,3 +49,44 @@ bool cells_block(vec3 from_ws, vec3 to_ws)
     }
     return blocked;
 }
+
+// The next run of occupied cells along a ray in cells (`direction` a unit vector without zeros) that free cells come before,
+// from `t` on; `t` ends behind it. `far` in cells. False where there is none.
+bool cells_next_run(vec3 start, vec3 direction, float far, inout float t, inout bool free_before, out vec2 run)
+{
+    vec3 inverse = 1.0 / direction;
+    vec3 forward = step(0.0, direction);
+    ivec3 last = textureSize(occupancy, 0) - 1;
+    bool inside = false;
+    bool left = false;
+    run = vec2(far);
+    for (int i = 0; i < CELL_STEPS; ++i) {
+        if (t < far && !left) {
+            vec3 p = start + direction * t;
+            float level = floor(texelFetch(occupancy, clamp(ivec3(floor(p)), ivec3(0), last), 0).r * 255.0 + 0.5);
+            bool solid = level < 0.5;
+            if (solid && free_before && !inside) {
+                inside = true;
+                run.x = t;
+            }
+            left = !solid && inside;
+            if (left) {
+                run.y = t;
+            } else {
+                t += max(cell_exit(p, inverse, forward, exp2(max(level - 1.0, 0.0))), 0.0) + 1e-3;
+            }
+            free_before = free_before || !solid;
+        } else {
+            break;
+        }
+    }
+    return inside;
+}
+
+// Where a ray in cells leaves the grid.
+float cells_far(vec3 start, vec3 direction)
+{
+    vec3 size = vec3(textureSize(occupancy, 0));
+    vec3 t = (mix(vec3(0.0), size, step(0.0, direction)) - start) / direction;
+    return max(min(t.x, min(t.y, t.z)), 0.0);
+}

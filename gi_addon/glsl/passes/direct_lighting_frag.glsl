@@ -82,6 +82,10 @@ void main()
 #endif
         }
         diffuse = lit_light * INV_PI;
+#if HAS_DIRECT_SUBSURFACE
+        vec4 below = texelFetch(direct_subsurface, pixel, 0);
+        diffuse = mix(diffuse, below.rgb, below.a);
+#endif
     }
 #if HAS_DIRECT_DIFFUSE
     direct_diffuse = vec4(diffuse, 1.0);

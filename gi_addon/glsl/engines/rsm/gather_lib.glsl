@@ -37,13 +37,14 @@ struct Gathered {
     vec4 direction;   // Σ luminance × direction to the source; Σ luminance
 };
 
-Gathered gather_vpls(vec3 position_ws, vec3 n, vec3 ng)
+// Every `stride`-th virtual light from `first` on, each standing for `stride` of them.
+Gathered gather_some_vpls(vec3 position_ws, vec3 n, vec3 ng, int first, int stride)
 {
     Gathered g = Gathered(vec3(0.0), vec4(0.0));
 #if HAS_OCCUPANCY
     vec3 start_ws = cells_clear(position_ws, ng);
 #endif
-    for (int i = 0; i < vpl_count; ++i) {
+    for (int i = first; i < vpl_count; i += stride) {
         Vpl vpl = vpls[i];
         vec3 d = vpl.position_ws - position_ws;
         float d2 = dot(d, d);
@@ -55,7 +56,7 @@ Gathered gather_vpls(vec3 position_ws, vec3 n, vec3 ng)
             continue;
         }
 #if HAS_OCCUPANCY && MESH_LIGHTS
-        if (own_lamp_blocks(rsm_lights[vpl.light], vpl.position_ws, position_ws)) {
+        if (vpl.light >= 0 && own_lamp_blocks(rsm_lights[vpl.light], vpl.position_ws, position_ws)) {
             continue;
         }
 #endif
@@ -77,6 +78,9 @@ Gathered gather_vpls(vec3 position_ws, vec3 n, vec3 ng)
         float arriving = luminance(flux) * cos_p / (PI * d2 + cos_p * vpl.area);
         g.direction += vec4(w, 1.0) * arriving;
     }
-    g.radiance *= INV_PI;
+    g.radiance *= INV_PI * float(stride);
+    g.direction *= float(stride);
     return g;
 }
+
+Gathered gather_vpls(vec3 position_ws, vec3 n, vec3 ng) { return gather_some_vpls(position_ws, n, ng, 0, 1); }
