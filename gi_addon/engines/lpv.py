@@ -21,11 +21,13 @@ from ..graph import Buffer, Optional, Pass, Planned, Texture, Uniform
 from ..passes.ao import AOBlur
 from ..passes.brdf_tables import BRDFTables
 from ..passes.direct_lighting import DirectLighting
-from ..passes.gbuffer import GBuffer, TranslucentTint, _screen
+from ..passes.gbuffer import GBuffer, TranslucentBack, TranslucentLayer, TranslucentTint, _screen
 from ..passes.lights import LightList, RSMGeneration, ShadowMaps
 from ..passes.resolve import Resolve
+from ..passes.volumetric import MEDIUM_UNIFORMS, Volumetric, air, medium_defines, set_medium
 from ..scene import SHADOW
 from ..settings import Settings
+from .rsm import Subsurface
 
 SH_COUNT = 9
 # Points of a cell's cross-section that the geometry is tested at, along each side: odd, so that one is in the middle, and
@@ -51,6 +53,8 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         RSMGeneration(),
         RadianceInjection(),
         GBuffer(),
+        TranslucentLayer(),
+        TranslucentBack(),
         TranslucentTint(),
         GeometryInjection(),
         Propagation(settings.bounces),
@@ -58,7 +62,10 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         AOBlur(),
         IndirectLighting(),
         GlossyLighting(),
+        Refraction(),
+        Subsurface(),
         DirectLighting(),
+        Volumetric(),
         Resolve(layers),
     ]
 
@@ -111,6 +118,9 @@ _GRID = (
 def _set_grid(frame: Frame, program, facts: Facts, **more) -> None:
     g = grid(facts)
     frame.set(program, grid_origin=g.origin, grid_cell=g.cell, grid_size=g.size, **more)
+
+
+_AIR_SETTINGS = ("use_volumetric", "volume.density", "volume.anisotropy")
 
 
 def _bounce_off(facts: Facts) -> str | None:
@@ -170,16 +180,20 @@ class RadianceInjection(Pass):
         Uniform("tile", "int", "index of the view whose tile is injected"),
         Uniform("fixed_scale", "float", "units of fixed point per W"),
         Uniform("first_group", "int", "1 where the sums are the volume's first"),
+        *MEDIUM_UNIFORMS,
     )
     shaders = {
         "main": {"compute": "engines/lpv/inject_comp.glsl"},
         "source": {"compute": "engines/lpv/source_comp.glsl"},
     }
     depends = ("lights", "world", "transforms", "meshes", "materials")
-    settings = ("lpv.resolution",)
+    settings = ("lpv.resolution", *_AIR_SETTINGS)
 
     def rate(self, facts: Facts) -> str:
         return RSMGeneration().rate(facts)
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return medium_defines(facts)
 
     def absent(self, facts: Facts) -> str | None:
         return _bounce_off(facts)
@@ -189,6 +203,7 @@ class RadianceInjection(Pass):
         inject, source = frame.program(planned), frame.program(planned, "source")
         sample = frame.light_sample(bounce=True)
         flux = frame.resources["lpv.flux"]
+        set_medium(frame, inject, facts)
         for first, (scale, lights) in enumerate(fixed_point_groups(sample.lights, grid(facts).cell)):
             flux.clear()
             for tile, view in enumerate(sample.views):
@@ -307,6 +322,9 @@ class Propagation(Pass):
         Uniform("batch_count", "int", "ordinates in the batch"),
         Uniform("fixed_scale", "float", "units of fixed point per W"),
         Uniform("bounced", "int", "1 to start from what the walls reflect too"),
+        Uniform("medium_extinction", "vec3", "share of light lost per metre of the air"),
+        Uniform("medium_scattering", "vec3", "share of light scattered per metre"),
+        Uniform("medium_anisotropy", "float", "mean cosine of the scattering angle"),
         Uniform("wave", "int", "the diagonal plane whose cells take their light"),
     )
     shaders = {
@@ -317,7 +335,7 @@ class Propagation(Pass):
         "bounced": {"compute": "engines/lpv/bounced_comp.glsl"},
     }
     depends = ("lights", "world", "transforms", "meshes", "materials")
-    settings = ("lpv.resolution", "lpv.directions", "lpv.occlusion", "bounces")
+    settings = ("lpv.resolution", "lpv.directions", "lpv.occlusion", "bounces", *_AIR_SETTINGS)
 
     def __init__(self, bounces: int = 1) -> None:
         self.reads = ("lpv.source", Optional("lpv.walls"))
@@ -334,13 +352,22 @@ class Propagation(Pass):
         return RSMGeneration().rate(facts)
 
     def defines(self, facts: Facts) -> dict[str, int]:
-        return {"HAS_LPV_BOUNCED": int(facts.settings.bounces > 1)}
+        return {"HAS_LPV_BOUNCED": int(facts.settings.bounces > 1), **medium_defines(facts)}
 
     def run(self, frame: Frame, planned: Planned) -> None:
         facts = planned.facts
         g = grid(facts)
         table = ordinates(int(facts.settings.lpv.directions))
         frame.upload("lpv.ordinates", table)
+        filled = air(facts)
+        if filled is not None:
+            medium = filled.medium
+            for key in ("main", "bounced") if planned.has("lpv.albedo") else ("main",):
+                frame.set(
+                    frame.program(planned, key),
+                    medium_extinction=tuple(float(v) for v in medium.extinction),
+                    medium_scattering=tuple(float(v) for v in medium.scattering), medium_anisotropy=float(medium.anisotropy),
+                )  # fmt: skip
         self._carry(frame, planned, table, bounced=False)
         if planned.has("lpv.albedo"):
             reflect, bounced = frame.program(planned, "reflect"), frame.program(planned, "bounced")
@@ -455,4 +482,29 @@ class GlossyLighting(Pass):
     def run(self, frame: Frame, planned: Planned) -> None:
         program = frame.program(planned)
         _set_grid(frame, program, planned.facts, glossy_rays=planned.facts.settings.lpv.glossy_rays)
+        frame.screen(planned, program)
+
+
+class Refraction(Pass):
+    """A refracted ray per pixel through the volume."""
+
+    title = "LPV Translucency"
+    figure = "LPV Lighting Computation"
+    reads = (
+        "lpv.volume", "lpv.walls", "gbuffer.transmission", "translucent.depth", "translucent.normal",
+        "translucent.color", "translucent.medium", "translucent.back_depth", "translucent.back_normal",
+    )  # fmt: skip
+    writes = (
+        Texture("transmission.indirect", "transmission_indirect", "radiance through refracting surfaces, tinted; alpha 1 "
+                "where the ray met a wall", "rgba32f", _screen),
+    )  # fmt: skip
+    uniforms = _GRID
+    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/lpv/refraction_frag.glsl"}}
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return {"MARCH_STEPS": _march_steps(facts), "MARCH_LIGHT": 1, "HAS_LPV_WALLS": 1}
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        program = frame.program(planned)
+        _set_grid(frame, program, planned.facts)
         frame.screen(planned, program)

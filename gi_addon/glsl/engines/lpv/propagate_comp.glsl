@@ -40,6 +40,10 @@ void main()
     int slab = ordinate * grid_size.z;
     vec3 flux = imageLoad(lpv_radiance, cell + ivec3(0, 0, slab)).rgb;
     float whole = share.x + share.y + share.z;
+    vec3 kept = vec3(1.0);
+#if HAS_MEDIUM
+    kept = exp(-medium_extinction * (grid_cell / whole)); // a straight way crosses |ω|₁/h faces per metre
+#endif
     float behind = whole;
     float ahead = whole;
     float open_ahead = whole;
@@ -62,7 +66,7 @@ void main()
             }
 #endif
             vec4 neighbour = imageLoad(lpv_radiance, from + ivec3(0, 0, slab));
-            flux += (share[axis] * (1.0 - coverage) * neighbour.a) * neighbour.rgb;
+            flux += (share[axis] * (1.0 - coverage) * neighbour.a) * neighbour.rgb * kept;
         }
 #if HAS_LPV_WALLS
         if (local[axis] < grid_size[axis] - 1) {
