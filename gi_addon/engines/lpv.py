@@ -137,7 +137,8 @@ def _bounce_off(facts: Facts) -> str | None:
 # moments, the widest spaced of the solutions found. Directions along the grid, as in Lebedev's sets, carry the outline of a lit
 # patch across the room unblurred: on the empty Cornell box, 50 of Lebedev's have relMSE .082 and 48 of these .04 at 32³.
 _ORBITS = {
-    48: (((0.25478280537, 0.25478280537, 0.932829804507), 0.49655563), ((0.266270511079, 0.68157905445, 0.68157905445), 0.50344437)),
+    48: (((0.25478280537, 0.25478280537, 0.932829804507), 0.49655563),
+         ((0.266270511079, 0.68157905445, 0.68157905445), 0.50344437)),
     72: (((0.142759509604, 0.142759509604, 0.979407701029), 0.22828848),
          ((0.256275965365, 0.536578884934, 0.803993613046), 0.77171152)),
 }  # fmt: skip
@@ -281,8 +282,8 @@ class GeometryInjection(Pass):
         stages = {"vertex": "surface/surface_vert.glsl", "fragment": "engines/lpv/geometry_frag.glsl"}
         options = {
             "full": reflect, "units": len(planned.texture_reads()), "defines": {
-                "SURFACE_TABLES": 2 if planned.has("brdf.average") else 0, "SURFACE_SEE_THROUGH_GLASS": 1, "SURFACE_SEEN_BY_CAMERA": 0,
-                "SURFACE_SEEN_BY_SHADOW": 1,
+                "SURFACE_TABLES": 2 if planned.has("brdf.average") else 0, "SURFACE_SEE_THROUGH_GLASS": 1,
+                "SURFACE_SEEN_BY_CAMERA": 0, "SURFACE_SEEN_BY_SHADOW": 1,
             },
         }  # fmt: skip
         programs = frame.gpu.programs(planned, stages, SHADOW, **options)
