@@ -7,7 +7,9 @@ from collections.abc import Callable
 
 from ..graph import Pass
 from ..settings import Settings
-from . import rsm, ssdo
+from . import lpv, rsm, ssdo
 
 # Technique -> its passes in execution order, for the settings and the film layers wanted.
-TECHNIQUES: dict[str, Callable[[Settings, tuple[str, ...]], list[Pass]]] = {"RSM": rsm.passes, "SSDO": ssdo.passes}
+TECHNIQUES: dict[str, Callable[[Settings, tuple[str, ...]], list[Pass]]] = {
+    "RSM": rsm.passes, "LPV": lpv.passes, "SSDO": ssdo.passes,
+}  # fmt: skip
