@@ -55,6 +55,7 @@ def _group(cls: type) -> Any:
 TECHNIQUES = (
     ("RSM", "Reflective Shadow Maps", "One bounce gathered from virtual point lights on what the lights see"),
     ("LPV", "Light Propagation Volumes", "Bounces carried through a grid of cells over the scene"),
+    ("VCT", "Voxel Cone Tracing", "Bounces gathered by cones through a grid of lit cells"),
     ("SSDO", "Screen-Space Directional Occlusion", "Bounces gathered from what the camera sees"),
 )
 
@@ -232,6 +233,32 @@ class SSDOSettings:
 
 
 @dataclass
+class VCTSettings:
+    """Voxel cone tracing (Crassin et al. 2011)."""
+
+    resolution: int = _setting(
+        64, "Resolution", "Cells along the longest side of the voxel grid", low=16, high=512,
+        higher="thinner walls hold, finer bounce light", lower="faster, less memory",
+    )  # fmt: skip
+    cones: int = _setting(
+        6, "Cones", "Cones traced from each point into its hemisphere and sub-frame", low=1, high=64,
+        higher="finer directions, sharper contact", lower="faster, blurrier",
+    )  # fmt: skip
+    shadow_cones: bool = _setting(
+        False, "Shadow Cones", "Direct light's shadows by cones through the voxels in place of shadow maps: soft at one sub-frame, "
+        "as fine as the grid",
+    )  # fmt: skip
+    emissive_voxels: bool = _setting(
+        False, "Emissive Voxels", "Emissive surfaces shine out of the voxels, into the indirect passes: any number of them "
+        "without noise, as fine as the grid; else lights are drawn from them, into the direct passes",
+    )  # fmt: skip
+    continuous_voxelization: bool = _setting(
+        False, "Continuous Voxelization", "Voxelize in every sub-frame, as the paper's Table 2 has it; else only when a "
+        "mesh, a transform or a material has changed. Light is always injected anew when it changes",
+    )  # fmt: skip
+
+
+@dataclass
 class Settings:
     """All of ``scene.quartet``."""
 
@@ -278,6 +305,7 @@ class Settings:
     volume: VolumeSettings = _group(VolumeSettings)
     rsm: RSMSettings = _group(RSMSettings)
     lpv: LPVSettings = _group(LPVSettings)
+    vct: VCTSettings = _group(VCTSettings)
     ssdo: SSDOSettings = _group(SSDOSettings)
 
     # -- access by dotted name ---------------------------------------------------------------------------------

@@ -55,7 +55,7 @@ def picture(path="", **settings):
 
 
 # Those of a technique that is not the default are tested with it.
-@pytest.mark.parametrize("path", [p for p, _, _ in walk() if not p.startswith("ssdo.")])
+@pytest.mark.parametrize("path", [p for p, _, _ in walk() if not p.startswith(("ssdo.", "vct."))])
 def test_every_setting_changes_the_picture_or_the_plan(gl, path):
     if path in ELSEWHERE:
         assert OTHER[path] is None
