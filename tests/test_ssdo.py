@@ -298,7 +298,7 @@ def test_what_is_switched_off_does_not_run(gl):
 
 
 OTHER = {
-    "ssdo.samples": 64, "ssdo.steps": 4, "ssdo.integrator": "RAYS", "ssdo.radius": 0.2, "ssdo.thickness": 0.02,
+    "ssdo.samples": 64, "ssdo.steps": 4, "ssdo.integrator": "BITMASK", "ssdo.radius": 0.2, "ssdo.thickness": 0.02,
     "ssdo.margin": 0.25, "ssdo.sources": "SCREEN", "ssdo.occlusion": "MITTRING", "ssdo.shadows": "SCREEN",
     "ssdo.contact": 0.5, "ssdo.volumetric": "RADIAL",
 }  # fmt: skip
