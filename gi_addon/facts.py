@@ -39,6 +39,7 @@ class Facts:
     layered: bool
     world_black: bool
     ao_distance: float
+    world_visible: bool = True  # to the camera
     medium: Medium | None = None  # that fills the world
     margin: int = 0  # px drawn beyond each side of the picture
     stamps: dict[str, str] = field(default_factory=dict)
@@ -114,6 +115,7 @@ def gather_facts(
         layered=any(c.glossy or c.transmissive for c in compiled),
         world_black=world is None or world.black,
         ao_distance=s.ao.distance or scene.world.ao_distance,
+        world_visible=scene.world.visible_camera,
         medium=mean_medium(scene.world.graph, scene.images),
         stamps=scene.stamps(),
     )

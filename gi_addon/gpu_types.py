@@ -34,7 +34,7 @@ LIGHT = struct(
     ("v_ws", "f4", 3), ("spot_scale", "f4"),      # spot: 1 / ((1 − cos) blend)
     ("center_ws", "f4", 3), ("spread_tan", "f4"),  # of the whole light; tan of half the spread (area)
     ("patch_radius", "f4"), ("spread_scale", "f4"), ("shape", "i4"), ("flags", "i4"),
-    ("soft_radius2", "f4"), ("_pad0", "u4"), ("_pad1", "u4"), ("_pad2", "u4"),  # m², of a point's or spot's soft disc
+    ("soft_radius2", "f4"), ("diffuse", "f4"), ("glossy", "f4"), ("_pad0", "u4"),  # m², of a point's or spot's soft disc
 )  # fmt: skip
 LIGHT_SUN, LIGHT_POINT, LIGHT_SPOT, LIGHT_AREA, LIGHT_WORLD, LIGHT_MESH = range(6)
 LIGHT_FLAG_SHADOW, LIGHT_FLAG_BOUNCE, LIGHT_FLAG_CAMERA = 1, 2, 4
@@ -57,7 +57,7 @@ LIGHT_VIEW = struct(
 # A virtual point light: `flux` (W) reflected by a disc of `area` (m²) at `position_ws` facing `normal_ws`.
 VPL = struct(
     ("position_ws", "f4", 3), ("area", "f4"),
-    ("normal_ws", "f4", 3), ("light", "i4"),  # that lit it, in rsm.lights
+    ("normal_ws", "f4", 3), ("light", "i4"),  # that lit it, in rsm.lights; −1 another virtual light
     ("flux", "f4", 3), ("_pad", "f4"),
 )  # fmt: skip
 

@@ -86,6 +86,7 @@ class Buffer:
     dtype: np.dtype
     count: Callable[[Facts], int]
     when: Callable[[Facts], str | None] | None = None
+    scratch: bool = False  # the pass's own, allocated whenever it runs
 
     def nbytes(self, facts: Facts) -> int:
         return max(16, self.count(facts) * self.dtype.itemsize)

@@ -151,6 +151,7 @@ class LightRig:
     shadow: Maps
     bounce: Maps
     notes: list[str] = field(default_factory=list)
+    direct_world: WorldMap | None = None  # the same world, its directions drawn as suits direct light
 
     def moves(self, index: int, *, bounce: bool) -> bool:
         """Whether source ``index`` is another point in each sub-frame. Suns, spheres and discs bounce from their
@@ -175,7 +176,7 @@ class LightRig:
                 u = np.array([0.5, 0.5])
             else:
                 u = sobol_2d(subframe, source.seed)
-            self._place(lights[i], source, u, subframes)
+            self._place(lights[i], source, u, subframes, bounce=bounce)
             lights[i]["first_view"] = maps.first[i]
             if maps.first[i] < 0:
                 lights[i]["views"] = 0
@@ -219,13 +220,15 @@ class LightRig:
 
     # -- sources -------------------------------------------------------------------------------------------------
 
-    def _place(self, out: np.ndarray, source: Source, u: np.ndarray, subframes: int) -> None:
+    def _place(self, out: np.ndarray, source: Source, u: np.ndarray, subframes: int, *, bounce: bool) -> None:
         out["kind"] = source.kind
         out["views"] = source.views
         out["flags"] = LIGHT_FLAG_BOUNCE
+        out["diffuse"] = out["glossy"] = 1.0
         light = source.light
         if source.kind == LIGHT_WORLD:
-            direction, weight, pdf = self.world.sample(u[None])
+            world = self.world if bounce or self.direct_world is None else self.direct_world
+            direction, weight, pdf = world.sample(u[None])
             out["axis_ws"] = -direction[0]
             out["emission"] = weight[0] / source.count
             out["patch_radius"] = np.sqrt(1.0 / (np.pi * max(pdf[0], 1e-12) * source.count * subframes))
@@ -235,6 +238,7 @@ class LightRig:
         if source.kind == LIGHT_MESH:
             self._place_on_mesh(out, source, u, subframes)
             return
+        out["diffuse"], out["glossy"] = light.visible_diffuse, light.visible_glossy
         matrix = light.matrix
         center = matrix[:3, 3]
         x, y, z = (_unit(matrix[:3, k]) for k in range(3))
@@ -438,16 +442,20 @@ def build_rig(
         corners, size = atlas.pack(sizes, power_of_two=True)
         return Maps(sizes, corners, size, first)
 
+    def bounced(source: Source) -> bool:
+        return bounces and (source.light is None or source.light.visible_diffuse)
+
     def own_shadow_map(source: Source) -> bool:
         if not shadows or (source.light is not None and not source.light.use_shadow):
             return False
         # What is drawn anew in each sub-frame anyway, at the very point that direct light comes from, is drawn once if
         # it is fine enough.
-        return not (bounces and source.kind in (LIGHT_AREA, LIGHT_MESH) and bounce_resolution >= shadow_resolution)
+        drawn_anew = source.kind in (LIGHT_AREA, LIGHT_MESH) and bounced(source)
+        return not (drawn_anew and bounce_resolution >= shadow_resolution)
 
     return LightRig(
         sources, bounds, world, emitters,
-        tiles(shadow_resolution, own_shadow_map, bounce=False), tiles(bounce_resolution, lambda s: bounces, bounce=True),
+        tiles(shadow_resolution, own_shadow_map, bounce=False), tiles(bounce_resolution, bounced, bounce=True),
         notes,
     )  # fmt: skip
 

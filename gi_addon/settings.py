@@ -106,6 +106,10 @@ class WorldSettings:
         512, "Resolution", "Texels along one side of those shadow maps", low=64, high=4096, unit="px",
         higher="finer openings", lower="faster, leaks through small walls",
     )  # fmt: skip
+    aimed: bool = _setting(
+        True, "Aim at Openings", "Draw the directions of direct light mostly from the parts of the sky that visible "
+        "surfaces see, from four sub-frames on",
+    )  # fmt: skip
 
 
 @dataclass
@@ -226,6 +230,10 @@ class Settings:
     viewport_samples: int = _setting(
         16, "Viewport Samples", "Sub-frames averaged in the viewport while nothing changes", low=1, high=65536,
         soft_high=256, higher="smoother after a while", lower="settles sooner",
+    )  # fmt: skip
+    motion_steps: int = _setting(
+        8, "Motion Steps", "Times at which the scene is read while the shutter is open, with motion blur switched on; the "
+        "sub-frames are shared among them", low=1, high=256, higher="smoother streaks, longer sync", lower="faster; 1 is sharp",
     )  # fmt: skip
     bounces: int = _setting(
         1, "Bounces", "Diffuse bounces of light; 1 is the paper's", low=0, high=8,

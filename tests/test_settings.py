@@ -18,13 +18,13 @@ OTHER = {
     "use_translucency": False, "use_volumetric": False, "use_area_lights": False, "samples": 3,
     "viewport_samples": None, "bounces": 0, "pixel_filter": "BLACKMAN_HARRIS", "filter_width": 3.0,
     "shadows.resolution": 64, "shadows.softness": 6.0, "ao.samples": 1, "ao.steps": 1, "ao.distance": 0.3,
-    "ao.contact": 0.005, "world.samples": 1, "world.resolution": 64, "rsm.resolution": 32, "rsm.samples": 7,
+    "ao.contact": 0.005, "world.samples": 1, "world.aimed": False, "world.resolution": 64, "rsm.resolution": 32, "rsm.samples": 7,
     "volume.samples": 2, "volume.density": 0.2, "volume.anisotropy": 0.5, "rsm.visibility": "NONE",
     "rsm.visibility_resolution": 32,
-    "gather_scale": 1,
+    "gather_scale": 1, "motion_steps": None,
 }  # fmt: skip
 # Not read by the picture itself: the viewport's own number of sub-frames; and effects whose techniques have yet to land.
-ELSEWHERE = {"viewport_samples", "technique", "use_glossy"}
+ELSEWHERE = {"viewport_samples", "motion_steps", "technique", "use_glossy"}
 
 
 @functools.cache
@@ -59,6 +59,8 @@ def test_every_setting_changes_the_picture_or_the_plan(gl, path):
         assert OTHER[path] is None
         return
     haze = {"volume__density": 0.1} if path in IN_HAZE else {}
+    if path == "world.aimed":
+        haze["samples"] = 4  # fewer are not aimed
     result, base = picture(path, **haze), picture(**haze)
     changed = any(not np.array_equal(result.passes[n], base.passes[n]) for n in base.passes)
     assert changed or result.plan.text() != base.plan.text()

@@ -31,21 +31,47 @@ PASS, FAIL, NATURE, NOT_APPLICABLE, REPORTED, ERROR = "pass", "fail", "fail by n
 @dataclass(frozen=True)
 class Traits:
     """What a technique is made of, as far as tests must know: its grid, its light map, the setting that draws its random
-    set, whether it knows only the screen, whether it tests the visibility of what it gathers."""
+    set, what it tests visibility in (nothing: it does not), whether it knows only the screen, whether it carries flux
+    through a volume."""
 
     grid: str = ""
     map: str = ""
     set: str = ""
+    blockers: str = "geometry"
     screen_space: bool = False
-    visibility: bool = True
-    volume: bool = False  # propagates flux through a volume
+    volume: bool = False
 
 
 TRAITS: dict[str, Traits] = {
-    "RSM": Traits(map="rsm.resolution", set="rsm.samples", visibility=False),
-    "LPV": Traits(grid="lpv.resolution", volume=True),
-    "VCT": Traits(grid="vct.resolution"),
+    "RSM": Traits(map="rsm.resolution", set="rsm.samples", blockers="rsm.visibility_resolution"),
+    "LPV": Traits(grid="lpv.resolution", blockers="lpv.resolution", volume=True),
+    "VCT": Traits(grid="vct.resolution", blockers="vct.resolution"),
     "SSDO": Traits(set="ssdo.samples", screen_space=True),
+}
+
+
+# Failures that are known, with their causes: shown beside the verdict. A test that fails and is not listed here fails the
+# test suite too.
+_GATHER = (
+    "the low-resolution gather moves with the pixels and costs gain where a block of them is as large as a corner; with "
+    "gather_scale 1 RSM is exact to 0.1 % there"
+)
+KNOWN: dict[tuple[str, str], str] = {
+    ("RSM", "6"): _GATHER,
+    ("RSM", "7"): "a light's map has texels: what moves by less than one changes nothing, then all at once",
+    ("RSM", "13"): _GATHER,
+    ("VCT", "5"): "2 cells are just short of its w*: half a cell is lost to voxelisation on either side",
+    ("VCT", "6"): "few cones a sub-frame in a coarse grid: another pixel position draws another set",
+    ("VCT", "8"): "few cones a sub-frame in a coarse grid: another pixel position draws another set",
+    ("VCT", "9"): "the interpolated gather has fewer neighbours as the wall fills the picture",
+    ("VCT", "10"): "a cone set that differs by pixel leaves noise of the cones' spacing",
+    ("VCT", "13"): _GATHER,
+    ("SSDO", "6"): "directions are drawn anew for each pixel: one sub-frame is noise that moves with the camera",
+    ("SSDO", "7"): "the moving plate is a few pixels; its edge crosses pixel centres one row at a time",
+    ("SSDO", "8"): "directions are drawn anew for each pixel: one sub-frame is noise that moves with the camera",
+    ("SSDO", "10"): "directions are drawn anew for each pixel; 16 sub-frames leave 2 % of noise",
+    ("SSDO", "11"): "the depth buffer ends at the contact: the last pixel's light is lost",
+    ("SSDO", "13"): _GATHER,
 }
 
 
@@ -141,8 +167,8 @@ class Suite:
         self.studio = Studio()
         # Coarse structures keep software OpenGL in time; test 13 is the one about their size.
         self.base: dict[str, Any] = {}
-        for path, value in ((self.traits.grid, 32), (self.traits.map, 256)):
-            if path and not full:
+        for path, value in ((self.traits.blockers, 32), (self.traits.grid, 32), (self.traits.map, 256)):
+            if has_setting(path) and not full:
                 self.base[path.replace(".", "__")] = value
 
     def close(self) -> None:
@@ -165,12 +191,11 @@ class Suite:
         return self.render(scene, "Diffuse Indirect", **values).passes["Diffuse Indirect"].astype("f8")
 
     def cell(self, scene: Scene) -> float:
-        """Side of a grid cell in metres where the technique has a grid; 1/64 of the scene otherwise."""
+        """Side in metres of a cell of what the technique tests visibility in; 1/64 of the scene where it has none."""
         bounds = scene.bounds()
         extent = float((bounds[1] - bounds[0]).max())
-        if self.traits.grid and has_setting(self.traits.grid):
-            return extent / float(self.settings().get(self.traits.grid))
-        return extent / 64.0
+        path = self.traits.blockers
+        return extent / float(self.settings().get(path)) if has_setting(path) else extent / 64.0
 
 
 @dataclass(frozen=True)
@@ -247,12 +272,15 @@ def as_json(results: dict[str, dict[str, Finding]], *, full: bool) -> dict:
     for technique, findings in results.items():
         body["techniques"][technique] = {
             key: {
-                "verdict": f.verdict, "nature": f.nature, "note": f.note, "seconds": round(f.seconds, 2),
+                "verdict": f.verdict,
+                "nature": f.nature,
+                "note": f.note,
+                "seconds": round(f.seconds, 2),
                 "quantities": [{**asdict(q), "limit": q.limit, "holds": q.holds} for q in f.quantities],
                 "curves": [asdict(c) for c in f.curves],
             }
             for key, f in findings.items()
-        }  # fmt: skip
+        }
     return body
 
 

@@ -19,7 +19,9 @@ from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentL
 from ..passes.lights import LightList, RSMGeneration, ShadowMaps
 from ..passes.occupancy import CELL_UNIFORMS, Occupancy, set_cells
 from ..passes.resolve import Resolve
+from ..passes.surface_points import SETS, SurfacePoints, points_per_subframe
 from ..passes.volumetric import MEDIUM_UNIFORMS, Volumetric, medium_defines, set_medium
+from ..passes.world_guide import WorldGuide
 from ..settings import Settings
 
 
@@ -27,12 +29,14 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
     """Figure 4a, in order."""
     return [
         BRDFTables(),
+        Occupancy(),
+        WorldGuide(),
         LightList(),
         ShadowMaps(),
         RSMGeneration(),
         RSMFlux(),
-        RSMSamplingPattern(),
-        Occupancy(),
+        SurfacePoints(),
+        RSMSamplingPattern(settings),
         GBuffer(),
         TranslucentLayer(),
         TranslucentBack(),
@@ -42,6 +46,7 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         AOBlur(),
         InterpolatedIndirect(settings),
         IndirectLighting(settings),
+        Subsurface(),
         DirectLighting(),
         GlossyReflections(),
         Refraction(),
@@ -60,6 +65,11 @@ def _gather_defines(facts: Facts, *, always: bool = False) -> dict[str, int]:
     lamps = any(s.kind == LIGHT_MESH for s in facts.rig.sources)
     untested = {"HAS_OCCUPANCY": 0} if facts.settings.rsm.visibility == "NONE" and not always else {}
     return {"GATHER_SCALE": facts.settings.gather_scale, "MESH_LIGHTS": int(lamps), **medium_defines(facts), **untested}
+
+
+def vpl_count(facts: Facts) -> int:
+    """Virtual point lights of all bounces."""
+    return facts.settings.rsm.samples + max(facts.settings.bounces - 1, 0) * points_per_subframe(facts)
 
 
 class RSMFlux(Pass):
@@ -123,18 +133,29 @@ class RSMSamplingPattern(Pass):
     reads = ("rsm.flux", "rsm.depth", "rsm.albedo", "rsm.normal", "rsm.lights", "rsm.views")
     writes = (
         Buffer("vpls", "vpls", "virtual point lights of this sub-frame", "Vpl", VPL,
-               lambda f: f.settings.rsm.samples),
+               vpl_count),
     )  # fmt: skip
     uniforms = (
-        Uniform("vpl_count", "int", "how many to draw"),
+        Uniform("vpl_count", "int", "how many to draw; for the next bounce: where the last one's end"),
         Uniform("view_count", "int", "views in the list"),
         Uniform("levels", "int", "levels of the flux pyramid above the texels"),
+        Uniform("bounce_first", "int", "the first light of the bounce before"),
+        Uniform("point_first", "int", "the sub-frame's first surface point"),
+        Uniform("point_count", "int", "surface points of a bounce"),
         *MEDIUM_UNIFORMS,
+        *CELL_UNIFORMS,
     )
-    shaders = {"main": {"compute": "engines/rsm/vpls_comp.glsl"}}
+    shaders = {
+        "main": {"compute": "engines/rsm/vpls_comp.glsl"},
+        "bounce": {"compute": "engines/rsm/bounce_comp.glsl"},
+    }
+
+    def __init__(self, settings: Settings) -> None:
+        if settings.bounces > 1:
+            self.reads = _tested((*type(self).reads, "surface.points"), settings)
 
     def defines(self, facts: Facts) -> dict[str, int]:
-        return medium_defines(facts)
+        return _gather_defines(facts)
 
     def run(self, frame: Frame, planned: Planned) -> None:
         program = frame.program(planned)
@@ -148,6 +169,23 @@ class RSMSamplingPattern(Pass):
             levels=max(facts.rig.bounce.size).bit_length() - 1,
         )
         frame.compute(planned, program, (count,), (64,))
+        if facts.settings.bounces > 1:
+            self._more_bounces(frame, planned, count)
+
+    @staticmethod
+    def _more_bounces(frame: Frame, planned: Planned, count: int) -> None:
+        program = frame.program(planned, "bounce")
+        facts = planned.facts
+        points = points_per_subframe(facts)
+        sets = min(facts.subframes, SETS)
+        set_medium(frame, program, facts)
+        set_cells(frame, program, facts)
+        first = 0
+        for _ in range(facts.settings.bounces - 1):
+            frame.set(program, vpl_count=count, bounce_first=first, point_count=points,
+                      point_first=frame.subframe % sets * points)
+            frame.compute(planned, program, (points,), (64,))
+            first, count = count, count + points
 
 
 def _tested(reads: tuple, settings: Settings) -> tuple:
@@ -181,7 +219,7 @@ class InterpolatedIndirect(Pass):
 
     def run(self, frame: Frame, planned: Planned) -> None:
         program = frame.program(planned)
-        frame.set(program, vpl_count=planned.facts.settings.rsm.samples)
+        frame.set(program, vpl_count=vpl_count(planned.facts))
         set_cells(frame, program, planned.facts)
         set_medium(frame, program, planned.facts)
         frame.screen(planned, program)
@@ -212,7 +250,7 @@ class IndirectLighting(Pass):
 
     def run(self, frame: Frame, planned: Planned) -> None:
         program = frame.program(planned)
-        frame.set(program, vpl_count=planned.facts.settings.rsm.samples)
+        frame.set(program, vpl_count=vpl_count(planned.facts))
         set_cells(frame, program, planned.facts)
         set_medium(frame, program, planned.facts)
         frame.screen(planned, program)
@@ -233,7 +271,7 @@ _RAY_UNIFORMS = (
 def _set_ray(frame: Frame, program, facts: Facts) -> None:
     set_cells(frame, program, facts)
     set_medium(frame, program, facts)
-    frame.set(program, rsm_light_count=len(facts.rig.sources), vpl_count=facts.settings.rsm.samples)
+    frame.set(program, rsm_light_count=len(facts.rig.sources), vpl_count=vpl_count(facts))
 
 
 class GlossyReflections(Pass):
@@ -282,4 +320,32 @@ class Refraction(Pass):
     def run(self, frame: Frame, planned: Planned) -> None:
         program = frame.program(planned)
         _set_ray(frame, program, planned.facts)
+        frame.screen(planned, program)
+
+
+class Subsurface(Pass):
+    """Light scattered below surfaces, from where it entered: the RSM's depth as a translucent shadow map."""
+
+    title = "RSM Subsurface Scattering"
+    reads = (
+        "rsm.depth", "rsm.normal", "rsm.albedo", "rsm.lights", "rsm.views", "gbuffer.depth", "gbuffer.diffuse",
+        "gbuffer.subsurface",
+    )  # fmt: skip
+    writes = (
+        Texture("direct.subsurface", "direct_subsurface", "radiance as direct.diffuse, of light that entered around the "
+                "point; share of the diffuse albedo it is for", "rgba32f", _screen),
+    )  # fmt: skip
+    uniforms = (*MEDIUM_UNIFORMS, Uniform("rsm_light_count", "int", "lights with reflective shadow maps"))
+    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/rsm/subsurface_frag.glsl"}}
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return medium_defines(facts)
+
+    def absent(self, facts: Facts) -> str | None:
+        return None if facts.settings.use_translucency else "translucency is switched off"
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        program = frame.program(planned)
+        set_medium(frame, program, planned.facts)
+        frame.set(program, rsm_light_count=len(planned.facts.rig.sources))
         frame.screen(planned, program)

@@ -22,6 +22,7 @@ import numpy as np
 from gpu_extras.presets import draw_texture_2d
 
 from ..gl import Cancelled, CancelToken, GLError, shared
+from ..graph import Plan
 from ..renderer import Renderer, RenderError
 from ..scene import Camera, Scene
 from ..settings import SettingError, Settings
@@ -93,8 +94,9 @@ class Viewport:
         self._failed: tuple | None = None
         self._picture: Picture | None = None
         self._texture: tuple[Picture, gpu.types.GPUTexture] | None = None
-        # Of the GL thread: the renderer, and the request and sub-frame that its film is ready for.
+        # Of the GL thread: the renderer, its plan, and the request and sub-frame that its film is ready for.
         self._renderer: Renderer | None = None
+        self._plan: Plan | None = None
         self._next: tuple | None = None
         # What there was to do, for the tests and the update matrix of the docs.
         self.counts = Counter()
@@ -226,7 +228,7 @@ class Viewport:
         renderer.timers.enabled = request.timed
         renderer.timers.reset()
         if first == 0:
-            renderer.begin(
+            self._plan = renderer.begin(
                 request.scene, request.settings, resolution=size, region=region, subframes=samples,
                 camera=request.camera, film_transparent=request.film_transparent,
             )  # fmt: skip
@@ -242,15 +244,14 @@ class Viewport:
         pixels = np.clip(renderer.film()["combined"], -_HALF_MAX, _HALF_MAX)
         gl.check("the viewport")
         report = status.summarise(
-            "viewport", renderer._plan, done, time.perf_counter() - start, renderer.timers.collect(),
-            [*request.scene.notes, *renderer.frame.facts.rig.notes],
-        )  # fmt: skip
+            "viewport", renderer, self._plan, request.scene, done, time.perf_counter() - start
+        )
         self._next = (request.key, request.scale, done)
         return Picture(request, done, np.ascontiguousarray(pixels, np.float32), first_seconds, report,
                        frozenset(renderer.gpu.uploads))  # fmt: skip
 
     def _close_renderer(self, gl) -> None:
-        renderer, self._renderer = self._renderer, None
+        renderer, self._renderer, self._plan = self._renderer, None, None
         if renderer is not None:
             with contextlib.suppress(GLError):
                 renderer.close()
@@ -368,7 +369,11 @@ def view_camera(view: bpy.types.RegionView3D, scene: Scene, size: tuple[int, int
         world_from_view[:3, 3] += world_from_view[:3, 2] * back
         clip_from_view[2, 3] -= clip_from_view[2, 2] * -back
         near, far = max(near + back, 1e-3 * radius), far + back
-    return Camera(world_from_view, clip_from_view, near, far, aperture, focus or 10.0, name)
+    camera = Camera(world_from_view, clip_from_view, near, far, aperture, focus or 10.0, name)
+    if aperture > 0.0:
+        lens = scene.camera
+        camera.blades, camera.blade_turn, camera.blade_ratio = lens.blades, lens.blade_turn, lens.blade_ratio
+    return camera
 
 
 def _clip_planes(clip_from_view: np.ndarray) -> tuple[float, float]:

@@ -3,6 +3,6 @@
 
 from . import textures  # noqa: F401  registers its nodes
 from .compiler import CompiledGraph, compile_surface, compile_world
-from .means import Medium, mean_emission, mean_medium
+from .means import Medium, mean_albedo, mean_emission, mean_medium
 
-__all__ = ["CompiledGraph", "Medium", "compile_surface", "compile_world", "mean_emission", "mean_medium"]
+__all__ = ["CompiledGraph", "Medium", "compile_surface", "compile_world", "mean_albedo", "mean_emission", "mean_medium"]

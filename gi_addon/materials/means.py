@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..scene import Image, Link, Node, ShaderGraph
+from .spectrum import blackbody
 
 _GRAY = np.array([0.2126, 0.7152, 0.0722])
 # Operations of the Math node on two numbers that are known before rendering.
@@ -29,6 +30,13 @@ def mean_emission(graph: ShaderGraph, images: Sequence[Image]) -> np.ndarray:
     if graph.surface is None:
         return np.zeros(3)
     return _Walk(graph, images).closure(graph.surface, 0)
+
+
+def mean_albedo(graph: ShaderGraph, images: Sequence[Image]) -> np.ndarray:
+    """Mean share (3,) of light that a surface graph reflects, diffusely or not: a surface's light after its first bounce."""
+    if graph.surface is None:
+        return np.zeros(3)
+    return np.clip(_Walk(graph, images).albedo(graph.surface, 0), 0.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -87,6 +95,24 @@ class _Walk:
             t = float(np.clip(self.number(get("Fac", 0.5), depth), 0.0, 1.0))
             a, b = self.closure(get("Shader"), depth + 1), self.closure(get("Shader_001"), depth + 1)
             return a * (1.0 - t) + b * t
+        return np.zeros(3)
+
+    def albedo(self, link: Link | None, depth: int) -> np.ndarray:
+        """Mean reflectance (3,) of a closure: its colour, of which refraction and transparency take their share."""
+        if not isinstance(link, Link) or depth > 64:
+            return np.zeros(3)
+        node = self.graph.nodes[link.node]
+        get = node.inputs.get
+        if node.kind == "BSDF_PRINCIPLED":
+            kept = self.number(get("Alpha", 1.0), depth) * (1.0 - self.number(get("Transmission Weight", 0.0), depth))
+            return self.color(get("Base Color", 0.8), depth) * kept
+        if node.kind in ("BSDF_DIFFUSE", "BSDF_GLOSSY", "SUBSURFACE_SCATTERING"):
+            return self.color(get("Color", 0.8), depth)
+        if node.kind == "ADD_SHADER":
+            return self.albedo(get("Shader"), depth + 1) + self.albedo(get("Shader_001"), depth + 1)
+        if node.kind == "MIX_SHADER":
+            t = float(np.clip(self.number(get("Fac", 0.5), depth), 0.0, 1.0))
+            return self.albedo(get("Shader"), depth + 1) * (1.0 - t) + self.albedo(get("Shader_001"), depth + 1) * t
         return np.zeros(3)
 
     def medium(self, link: Link | None, depth: int) -> Medium:
@@ -152,6 +178,11 @@ class _Walk:
                                get("Color2", 0.5), depth)  # fmt: skip
         if node.kind == "VALTORGB" and node.params.get("table"):
             return np.mean([row[:3] for row in node.params["table"]], axis=0)
+        if node.kind == "BLACKBODY":
+            return blackbody(self.number(get("Temperature", 1500.0), depth))
+        if node.kind == "LIGHT_FALLOFF":
+            # With the distance squared as lights have it anyway; other falloffs count as that.
+            return self.number(get("Strength", 100.0), depth)
         if node.kind == "LIGHT_PATH":
             return 0.0 if value.output == "Is Camera Ray" else 1.0
         for name in ("Color", "Color1", "Value", "Fac", "Vector"):

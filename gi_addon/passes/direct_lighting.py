@@ -18,6 +18,7 @@ class DirectLighting(Pass):
         "lights", Optional("lights.views"), Optional("shadow.depth"), Optional("rsm.depth"), "gbuffer.depth", "gbuffer.normal",
         Optional("gbuffer.specular", ("direct.glossy",)), Optional("gbuffer.lobe", ("direct.glossy",)),
         Optional("brdf.energy", ("direct.glossy",)), Optional("brdf.average", ("direct.glossy",)),
+        Optional("direct.subsurface", ("direct.diffuse",)),
         Optional("screen.light", ("direct.diffuse",)),
     )  # fmt: skip
     writes = (

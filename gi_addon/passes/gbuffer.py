@@ -30,7 +30,7 @@ class GBuffer(Pass):
     reads = (Optional("brdf.albedo"), Optional("brdf.average"), Optional("brdf.energy"))
     writes = (
         Texture("gbuffer.depth", "gbuf_depth", "view depth, world units, 0 where nothing is; how far the smooth surface "
-                "stands above the triangle", "rg32f", _screen, scratch=True),
+                "stands above the triangle, -1 in a holdout", "rg32f", _screen, scratch=True),
         Texture("gbuffer.normal", "gbuf_normal", "shading normal and triangle's normal, world space, octahedral",
                 "rgba16", _screen),
         Texture("gbuffer.diffuse", "gbuf_diffuse", "diffuse albedo", "rgba16f", _screen,

@@ -29,7 +29,8 @@ class Resolve(Pass):
         )
 
     def defines(self, facts: Facts) -> dict[str, int]:
-        return {f"LAYER_{name.upper()}": facts.layers.index(name) if name in facts.layers else -1 for name in LAYERS}
+        layers = {name: facts.layers.index(name) if name in facts.layers else -1 for name in LAYERS}
+        return {"WORLD_VISIBLE": int(facts.world_visible)} | {f"LAYER_{name.upper()}": at for name, at in layers.items()}
 
     def run(self, frame: Frame, planned: Planned) -> None:
         units = len(planned.texture_reads())

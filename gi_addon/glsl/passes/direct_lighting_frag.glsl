@@ -82,15 +82,19 @@ void main()
             }
 #endif
             vec3 irradiance = arriving * cos_l;
-            open_light += irradiance;
-            lit_light += irradiance * visible;
+            open_light += irradiance * light.diffuse;
+            lit_light += irradiance * visible * light.diffuse;
 #if HAS_DIRECT_GLOSSY
             if (has_lobe && visible > 0.0) {
-                glossy += arriving * visible * gain * ggx_eval(lobe, widened_alpha(alpha, angle), n, v, l);
+                glossy += light.glossy * arriving * visible * gain * ggx_eval(lobe, widened_alpha(alpha, angle), n, v, l);
             }
 #endif
         }
         diffuse = lit_light * INV_PI;
+#if HAS_DIRECT_SUBSURFACE
+        vec4 below = texelFetch(direct_subsurface, pixel, 0);
+        diffuse = mix(diffuse, below.rgb, below.a);
+#endif
 #if HAS_SCREEN_LIGHT
         diffuse += texelFetch(screen_light, pixel, 0).rgb; // the world and emissive pixels, where screen space gathers them
 #endif

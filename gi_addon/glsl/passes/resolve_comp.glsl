@@ -27,8 +27,10 @@ void main()
     pixel += view.margin; // the film holds the picture alone
     vec2 uv = (vec2(pixel) + 0.5) * view.inverse_resolution;
     float depth = 0.0;
+    bool held = false;
 #if HAS_GBUF_DEPTH
     depth = texelFetch(gbuf_depth, pixel, 0).r;
+    held = texelFetch(gbuf_depth, pixel, 0).g < 0.0;
 #endif
     bool surface = depth > 0.0;
 
@@ -76,7 +78,7 @@ void main()
 #if HAS_GBUF_EMISSION
         emission = texelFetch(gbuf_emission, pixel, 0).rgb;
 #endif
-    } else if (view.film_transparent < 0.5) {
+    } else if (view.film_transparent < 0.5 && WORLD_VISIBLE != 0) {
         environment = world_radiance(normalize(ray_direction_ws(uv)));
     }
 #if HAS_GBUF_TRANSMISSION
@@ -122,7 +124,7 @@ void main()
     environment *= passes;
 
 #if LAYER_COMBINED >= 0
-    float alpha = surface || view.film_transparent < 0.5 ? 1.0 : 0.0;
+    float alpha = !held && (surface || view.film_transparent < 0.5) ? 1.0 : 0.0;
     add(LAYER_COMBINED, pixel, vec4(diffuse_direct + diffuse_indirect + glossy_direct + glossy_indirect +
                                         through_direct + through_indirect + volume + emission + environment,
                                     alpha));
