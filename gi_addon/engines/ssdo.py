@@ -180,8 +180,8 @@ class InterpolatedIndirect(_Gather):
         self.reads = ("ssdo.planes", _read(sent), "gbuffer.low_depth", "gbuffer.low_normal", "gbuffer.low_pixel")
         self.writes = (
             Texture(f"{low}.raw", "raw_indirect", _LIGHT, "rgba32f", gather_size, scratch=True),
-            Texture(f"{low}.raw_direction", "raw_direction", "Σ luminance × direction, and Σ luminance, of what arrives", "rgba32f",
-                    gather_size, scratch=True),
+            Texture(f"{low}.raw_direction", "raw_direction", "Σ luminance × direction, and Σ luminance, of what arrives",
+                    "rgba32f", gather_size, scratch=True),
         )  # fmt: skip
 
     def absent(self, facts: Facts) -> str | None:

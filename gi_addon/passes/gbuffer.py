@@ -127,7 +127,8 @@ class TranslucentTint(Pass):
     title = "Transparency Tint"
     reads = TranslucentLayer.reads
     writes = (
-        Texture("gbuffer.transmission", "gbuf_transmission", "tint of all refracting surfaces in front of the opaque one; alpha 0 where there are any",
+        Texture("gbuffer.transmission", "gbuf_transmission", "tint of all refracting surfaces in front of the opaque one; alpha "
+                "0 where there are any",
                 "rgba16f", _screen),
     )  # fmt: skip
 
