@@ -94,6 +94,12 @@ def gather_facts(
     margin = round(settings.ssdo.margin * max(resolution)) if settings.technique == "SSDO" else 0
     bounds = scene.bounds()
     s = settings
+    seen = scene.instances.visibility & CAMERA if len(scene.instances) else np.zeros(0, "u4")
+    used = {m for i, ms in enumerate(scene.instances.materials) if seen[i] for m in ms}
+    some = [compiled[m] for m in used]
+    # Whatever looks at lit surfaces looks at the lights' bounce maps.
+    bounced = s.use_indirect_diffuse or (s.use_glossy and any(c.glossy for c in some))
+    bounced = bounced or (s.use_translucency and any(c.transmissive or c.subsurface for c in some))
     from_screen = s.technique == "SSDO" and s.ssdo.sources == "SCREEN"
     rig = build_rig(
         scene.lights, bounds,
@@ -101,13 +107,10 @@ def gather_facts(
         emitters=Emitters.none() if from_screen or voxels_shine(s) else emitters, emitter_samples=_EMITTER_SAMPLES,
         area_lights=s.use_area_lights,
         shadows=s.use_shadows and not (s.technique == "SSDO" and s.ssdo.shadows == "SCREEN"),
-        bounces=s.use_indirect_diffuse and s.bounces > 0 and s.technique != "SSDO",
+        bounces=s.bounces > 0 and bounced and s.technique != "SSDO",
         shadow_resolution=s.shadows.resolution, bounce_resolution=s.rsm.resolution,
         world_resolution=s.world.resolution,
     )  # fmt: skip
-    seen = scene.instances.visibility & CAMERA if len(scene.instances) else np.zeros(0, "u4")
-    used = {m for i, ms in enumerate(scene.instances.materials) if seen[i] for m in ms}
-    some = [compiled[m] for m in used]
     return Facts(
         settings=s,
         resolution=(resolution[0] + 2 * margin, resolution[1] + 2 * margin),
