@@ -179,15 +179,15 @@ class SSDOSettings:
     """Screen-space directional occlusion (Ritschel, Grosch and Seidel 2009)."""
 
     samples: int = _setting(
-        256, "Samples", "Points tested in the depth buffer per gathering pixel, sub-frame and bounce", low=8, high=4096,
+        512, "Samples", "Points tested in the depth buffer per gathering pixel, sub-frame and bounce", low=8, high=4096,
         higher="less noise", lower="faster",
     )  # fmt: skip
     steps: int = _setting(
-        16, "Steps", "How many of the samples lie along one ray, or on one side of one slice", low=2, high=256,
+        32, "Steps", "How many of the samples lie along one ray, or on one side of one slice", low=2, high=256,
         higher="finds thin and far things; fewer directions", lower="more directions; misses small things",
     )  # fmt: skip
     integrator: str = _setting(
-        "BITMASK", "Integrator", "How directions are covered",
+        "RAYS", "Integrator", "How directions are covered",
         choices=(("RAYS", "Rays", "Cosine-distributed rays, each followed to its first hit"),
                  ("BITMASK", "Visibility Bitmask", "Slices of the hemisphere in 32 sectors that samples fill")),
     )  # fmt: skip
