@@ -315,6 +315,33 @@ def test_power_is_linear_and_renders_are_bit_identical(gl):
     assert difference.mean() <= 1e-3 * indirect(both).mean() and difference.max() <= 1e-3 * indirect(both).max()
 
 
+def test_lights_that_move_are_averaged_and_propagated_at_doublings(gl):
+    """An area light's bounce is another in each sub-frame; the volume after 8 holds their mean, in 4 propagations."""
+    scene, chosen = scenes.cornell(light="area"), Settings()
+    for name, value in (("technique", "LPV"), ("lpv.resolution", 16), ("samples", 8)):
+        chosen.set(name, value)
+
+    def job(g):
+        renderer = Renderer(g)
+        renderer.begin(scene, chosen, ("Diffuse Indirect",), resolution=(16, 9))
+        propagation = next(p for p in renderer._plan.run if p.title == "LPV Propagation").task
+        carry, runs = propagation._carry, []
+        propagation._carry = lambda *a, **k: (runs.append(renderer.frame.subframe), carry(*a, **k))
+        fluxes, counts = [], []
+        for index in range(8):
+            renderer.subframe(index)
+            n = propagation.injection.count
+            data = np.frombuffer(renderer.frame.resources["lpv.source"].read(), "f4").reshape(9, -1, 4)
+            fluxes.append(data[0, :, :3].astype("f8").sum() / n)
+            counts.append(n)
+        renderer.close()
+        return runs, fluxes, counts
+
+    runs, fluxes, counts = shared().call(job)
+    assert runs == [0, 1, 3, 7] and counts == list(range(1, 9))
+    assert max(fluxes) / min(fluxes) < 1.1
+
+
 def test_the_camera_does_not_move_the_light(gl):
     """Stability test 8: the grid belongs to the scene. The volume is the same from anywhere."""
     scene = scenes.cornell()
