@@ -17,7 +17,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from . import __version__
-from .cli_measure import bench_command, stability_command
+from .cli_measure import bench_command, certify_command, report_command, stability_command
 from .gl import GLError
 from .outputs import OUTPUTS
 from .renderer import RenderError, inspect, render
@@ -25,11 +25,6 @@ from .scene import Scene, SnapshotError
 from .settings import SettingError, Settings, walk
 
 console = Console(stderr=True)
-# What compare looks at.
-COMPARED = (
-    "Combined", "Diffuse Direct", "Diffuse Indirect", "Glossy Direct", "Glossy Indirect", "Emission", "Environment",
-    "Ambient Occlusion",
-)  # fmt: skip
 
 
 class _Errors(click.Group):
@@ -157,9 +152,19 @@ def snapshot_command(scene, frame, resolution, output) -> None:
 @_scene_options
 @click.option("--passes", default="Combined", help="'all', or pass names separated by commas.")
 @click.option("--dot", is_flag=True, help="Print the graph as Graphviz dot instead.")
-def inspect_command(scene, technique, samples, resolution, frame, assignments, passes, dot) -> None:
+@click.option("--certify", is_flag=True, help="Measure against Cycles: error, dearer settings, ablation, predicted failures.")
+@click.option("--reference-samples", default=256, show_default=True, help="Cycles samples per half, for --certify.")
+def inspect_command(
+    scene, technique, samples, resolution, frame, assignments, passes, dot, certify, reference_samples
+) -> None:
     """Print which passes SCENE needs and which are left out, why, and their sizes."""
     names = _pass_names(passes)
+    if certify:
+        if scene.suffix.lower() == ".npz":
+            raise click.UsageError("a snapshot has no Cycles reference: give the scene file itself")
+        with _blender(scene, technique, samples, resolution or (128, 72), frame, assignments) as bscene:
+            certify_command(scene, bscene, reference_samples)
+        return
     if scene.suffix.lower() == ".npz":
         plain, resolution = Scene.load(scene), resolution or (960, 540)
         settings = _settings(Settings(), technique, samples, assignments)
@@ -175,16 +180,35 @@ def inspect_command(scene, technique, samples, resolution, frame, assignments, p
 
 
 @main.command("compare")
-@click.argument("scene", type=click.Path(path_type=Path))
+@click.argument("scenes", nargs=-1, type=click.Path(path_type=Path))
 @_scene_options
+@click.option("--techniques", help="Techniques separated by commas, or 'all'.")
+@click.option("--sweep", type=click.Choice(("none", "quick", "full")), help="How many settings of each technique to try.")
+@click.option("--peers", default="", help="Rivals in the same run: cycles, eevee, or both separated by a comma.")
+@click.option("--effects", is_flag=True, help="The paper's Table 1 with numbers, on scenes made for each effect.")
 @click.option("--reference-samples", default=256, show_default=True, help="Cycles samples per half.")
 @click.option("-o", "--output", type=click.Path(path_type=Path), default=Path("quartet-compare"), show_default=True,
-              help="Folder for the sheets and results.json.")
-def compare_command(scene, technique, samples, resolution, frame, assignments, reference_samples, output) -> None:
-    """Render SCENE with Quartet and with unbiased Cycles (R1 and R∞, cached) and state the error per pass."""
+              help="Folder for the report, sheets and results.json.")
+def compare_command(scenes, techniques, sweep, peers, effects, reference_samples, output, **options) -> None:
+    """Render SCENES with Quartet and with unbiased Cycles (R1 and R∞, cached) and state the error per pass.
+
+    SCENES are files, or builtin:NAME. One scene alone gives a sheet; more scenes, --techniques, --sweep or --peers give
+    report.html with the chart of speed against accuracy. An interrupted sweep goes on where it stopped.
+    """
+    if not scenes and not effects:
+        raise click.UsageError("name a scene file, builtin:NAME, or --effects")
+    if effects or len(scenes) > 1 or techniques or sweep or peers:
+        report_command(scenes, techniques, sweep or "none", peers, effects, reference_samples, output, options)
+    else:
+        _sheet(scenes[0], reference_samples=reference_samples, output=output, **options)
+
+
+def _sheet(scene, technique, samples, resolution, frame, assignments, reference_samples, output) -> None:
+    """One technique on one scene: a table, a sheet of pictures and a JSON file."""
     from .compare.metrics import score
     from .compare.references import BOUNCES, reference
     from .compare.sheet import comparison
+    from .compare.study import COMPARED
 
     with _blender(scene, technique, samples, resolution or (320, 180), frame, assignments) as bscene:
         from .host import cycles, engine, properties
@@ -287,7 +311,16 @@ def _blender(scene: Path, technique, samples, resolution, frame, assignments) ->
         register()
         # A registered engine left behind makes Blender 4.5 hang when the process ends.
         atexit.register(lambda: hasattr(bpy.types.Scene, "quartet") and unregister())
-    bscene, notes = files.load(scene)
+    if str(scene).startswith("builtin:"):
+        from .compare.scenes import BUILTIN
+        from .host.build import build
+
+        name = str(scene).removeprefix("builtin:")
+        if name not in BUILTIN:
+            raise click.UsageError(f"no scene builtin:{name}; there are {', '.join(BUILTIN)}")
+        bscene, notes = build(BUILTIN[name]()), []
+    else:
+        bscene, notes = files.load(scene)
     if resolution:
         bscene.render.resolution_x, bscene.render.resolution_y = resolution
         bscene.render.resolution_percentage = 100

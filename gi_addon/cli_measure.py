@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The commands that measure: ``quartet stability`` and ``quartet bench``."""
+"""The commands that measure: ``quartet stability``, ``quartet bench`` and the report of ``quartet compare``."""
 
 from __future__ import annotations
 
+import datetime
 from pathlib import Path
 
 import click
@@ -16,7 +17,7 @@ def technique_names(text: str | None) -> list[str]:
     """'RSM,LPV' as names that exist; all of them for None."""
     from .engines import TECHNIQUES
 
-    if not text:
+    if not text or text.lower() == "all":
         return list(TECHNIQUES)
     names = [part.strip().upper() for part in text.split(",") if part.strip()]
     unknown = [name for name in names if name not in TECHNIQUES]
@@ -30,8 +31,14 @@ def technique_names(text: str | None) -> list[str]:
 @click.option("--tests", help="Test numbers separated by commas, e.g. 1,5,11; all by default.")
 @click.option("--full", is_flag=True, help="Sweep everything the protocol lists, with default structure sizes.")
 @click.option("--strict", is_flag=True, help="Exit with 1 if a test fails that the technique could pass.")
-@click.option("-o", "--output", type=click.Path(path_type=Path), default=Path("quartet-stability"), show_default=True,
-              help="Folder for stability.html and stability.json.")
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    default=Path("quartet-stability"),
+    show_default=True,
+    help="Folder for stability.html and stability.json.",
+)
 def stability_command(techniques, tests, full, strict, output) -> None:
     """Run the stability suite: value, limit and verdict of every test for every technique."""
     from .compare import stability, stability_checks  # noqa: F401 — the second fills the registry
@@ -62,12 +69,20 @@ def stability_command(techniques, tests, full, strict, output) -> None:
 @click.command("bench")
 @click.argument("scene", type=click.Path(path_type=Path), required=False)
 @click.option("--techniques", help="Techniques separated by commas; all by default.")
-@click.option("--scale", type=click.FloatRange(0.01, 4.0), help="Share of the paper's picture size; 1 on a GPU, 0.1 on a software driver.")
+@click.option(
+    "--scale", type=click.FloatRange(0.01, 4.0), help="Share of the paper's picture size; 1 on a GPU, 0.1 on a software driver."
+)
 @click.option("--frames", type=click.IntRange(1), help="Frames of each kind per row; 50 on a GPU, 5 on a software driver.")
 @click.option("--rows", help="Only rows whose name holds this text, e.g. '512²' or '1280x720'.")
 @click.option("--limit", type=float, default=60.0, show_default=True, help="Skip a row whose first frame takes longer, s.")
-@click.option("-o", "--output", type=click.Path(path_type=Path), default=Path("quartet-bench"), show_default=True,
-              help="Folder for bench.html, bench.json and bench.csv.")
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    default=Path("quartet-bench"),
+    show_default=True,
+    help="Folder for bench.html, bench.json and bench.csv.",
+)
 def bench_command(scene, techniques, scale, frames, rows, limit, output) -> None:
     """The paper's Table 2 on this machine: frame rates of SCENE (Sponza, as there; a Cornell box if none is given)."""
     from .compare import bench, scenes
@@ -90,18 +105,130 @@ def bench_command(scene, techniques, scale, frames, rows, limit, output) -> None
             (plain, _), label = _sync(bscene), scene.name
     scale = scale or (0.1 if shared().call(lambda gl: gl.software) else 1.0)
     calibration, timings = bench.bench(
-        plain, techniques=names, scale=scale, frames=frames, rows=chosen, limit_s=limit,
+        plain,
+        techniques=names,
+        scale=scale,
+        frames=frames,
+        rows=chosen,
+        limit_s=limit,
         progress=lambda text: console.print(text, style="dim", highlight=False),
-    )  # fmt: skip
-    table = Table("technique", "setting", "paper", "paper fps", "here", "ms moving", "ms still", "fps", "× paper", "per hardware", "MiB")
+    )
+    table = Table(
+        "technique", "setting", "paper", "paper fps", "here", "ms moving", "ms still", "fps", "× paper", "per hardware", "MiB"
+    )
     for r in bench.records(calibration, timings):
         paper_fps = "–" if r["paper_fps"] is None else f"{r['paper_fps']:g}{'?' if r['paper_doubtful'] else ''}"
-        numbers = [r["problem"], *[""] * 5] if r["problem"] else [
-            f"{r['ms']:.2f} ± {r['mad']:.2f}", f"{r['still_ms']:.2f}", f"{r['fps']:.1f}",
-            f"{r['ratio']:.3g}" if r["ratio"] else "–", f"{r['ratio_per_hardware']:.3g}" if r["ratio"] else "–", f"{r['planned_mib']:.1f}",
-        ]  # fmt: skip
+        numbers = (
+            [r["problem"], *[""] * 5]
+            if r["problem"]
+            else [
+                f"{r['ms']:.2f} ± {r['mad']:.2f}",
+                f"{r['still_ms']:.2f}",
+                f"{r['fps']:.1f}",
+                f"{r['ratio']:.3g}" if r["ratio"] else "–",
+                f"{r['ratio_per_hardware']:.3g}" if r["ratio"] else "–",
+                f"{r['planned_mib']:.1f}",
+            ]
+        )
         table.add_row(r["technique"], r["setting"], r["paper_resolution"], paper_fps, r["resolution"], *numbers)
     Console().print(table)
     console.print(bench.hardware_text(calibration), highlight=False)
     for path in bench.write(output, label, scale, calibration, timings):
         console.print(f"wrote {path}")
+
+
+def report_command(scenes, techniques, sweep, peers, effects, reference_samples, output, options) -> None:
+    """Measure scenes with all candidates and write the report. ``options`` are the scene options of the command line."""
+    from .cli import _blender, _sync
+    from .compare import report, study
+    from .compare.references import BOUNCES, reference
+    from .compare.sweeps import peer_sweep, technique_sweep
+    from .gl import driver
+
+    names = technique_names(techniques) if techniques or not options["technique"] else technique_names(options["technique"])
+    rivals = [p.strip().lower() for p in peers.split(",") if p.strip()]
+    if set(rivals) - {"cycles", "eevee"}:
+        raise click.UsageError(f"--peers {peers}: there are cycles and eevee")
+    if any(str(s).lower().endswith(".npz") for s in scenes):
+        raise click.UsageError("a snapshot has no Cycles reference: give the scene file itself")
+    candidates = [c for t in names for c in technique_sweep(t, sweep)] + [c for p in rivals for c in peer_sweep(p, sweep)]
+    size = options["resolution"] or (128, 72)
+    measured = []
+    for scene in scenes:
+        arguments = (None, options["samples"], size, options["frame"], options["assignments"])
+        with _blender(scene, *arguments) as bscene:
+            from .host import cycles, properties
+            from .host import peers as host_peers
+
+            plain, size = _sync(bscene)
+            key, base = plain.digest(), properties.read(bscene)
+            label = scene.name
+
+            def run_cycles(bounces: int, count: int, seed: int, bscene=bscene):
+                with console.status(f"Cycles, {bounces} bounce{'s' * (bounces > 1)}, {count} samples, seed {seed}"):
+                    cycles.set_up(bscene, cycles.Reference(bounces, count, seed))
+                    return {n: p[..., :3] for n, p in cycles.render_passes(bscene, study.COMPARED).items()}
+
+            console.print(f"{label}: references")
+            references = {k: reference(k, key, size, reference_samples, study.COMPARED, run_cycles) for k in BOUNCES}
+
+            def run_peer(candidate, passes, bscene=bscene):
+                if candidate.method == "EEVEE":
+                    return eevee.render(candidate, passes)
+                return host_peers.render(bscene, candidate, passes)
+
+            with host_peers.Eevee(str(scene), size, options["frame"]) as eevee:
+                runs = study.measure(
+                    plain,
+                    key,
+                    size,
+                    candidates,
+                    base=base,
+                    driver=driver(),
+                    cache=output / "runs",
+                    peer=run_peer,
+                    peer_version=host_peers.VERSION,
+                    progress=lambda text, label=label: console.print(f"{label}: {text}", style="dim", highlight=False),
+                )
+        record = study.scene_record(label, key, size, reference_samples, runs, references, plain.triangle_count())
+        measured.append(report.Measured(record, runs, references))
+    head = {"version": study.source_version(), "driver": driver(), "date": datetime.date.today().isoformat(), "sweep": sweep}
+    extra = ""
+    if effects:
+        from .compare import effects as table_1
+
+        extra = table_1.command(names, size, reference_samples, output, console)
+    files = study.write_results(output, head, [m.record for m in measured]) if measured else []
+    written, notes = report.write(output, head, measured, extra)
+    for m in measured:
+        for line in report.verdict_lines(m.record):
+            Console().print(f"{m.record['scene']}: {line}", highlight=False)
+    for note in notes:
+        console.print(f"note: {note}", style="yellow", highlight=False)
+    for path in [*files, written[0]]:
+        console.print(f"wrote {path}")
+    if len(written) > 1:
+        console.print(f"wrote {len(written) - 1} chart pictures in {output / 'charts'}")
+
+
+def certify_command(scene: Path, bscene, reference_samples: int) -> None:
+    """Print the certificate of a scene that is open in Blender."""
+    from .cli import _sync
+    from .compare.certificate import certify
+    from .compare.references import reference
+    from .host import cycles, properties
+
+    plain, size = _sync(bscene)
+    settings = properties.read(bscene)
+    kind = "R1" if settings.bounces <= 1 else "Rinf"
+
+    def run_cycles(bounces: int, count: int, seed: int):
+        cycles.set_up(bscene, cycles.Reference(bounces, count, seed))
+        return {n: p[..., :3] for n, p in cycles.render_passes(bscene, ("Combined",)).items()}
+
+    with console.status(f"{scene.name}: Cycles reference"):
+        halves = reference(kind, plain.digest(), size, reference_samples, ("Combined",), run_cycles)
+    with console.status("certifying") as status:
+        result = certify(plain, settings, size, {kind: halves}, progress=status.update)
+    click.echo(f"{scene.name}, {size[0]} × {size[1]} pixels, {plain.triangle_count()} triangles")
+    click.echo(result.text())

@@ -23,7 +23,7 @@ class Facts:
     """Facts about one frame. Reasons that passes give for their absence come from these."""
 
     settings: Settings
-    resolution: tuple[int, int]
+    resolution: tuple[int, int]  # of what is drawn: the picture and its margin
     outputs: tuple[str, ...]
     subframes: int
     rig: LightRig
@@ -39,8 +39,16 @@ class Facts:
     layered: bool
     world_black: bool
     ao_distance: float
+    world_visible: bool = True  # to the camera
     medium: Medium | None = None  # that fills the world
+    margin: int = 0  # px drawn beyond each side of the picture
     stamps: dict[str, str] = field(default_factory=dict)
+    emitters: Emitters = field(default_factory=Emitters.none)  # all of them, sampled as lights or not
+
+    @property
+    def glowing_voxels(self) -> bool:
+        """Whether emissive surfaces shine out of voxels rather than as lights drawn from them."""
+        return len(self.emitters) > 0 and voxels_shine(self.settings)
 
     @property
     def layers(self) -> tuple[str, ...]:
@@ -48,8 +56,28 @@ class Facts:
         return film_layers(self.outputs)
 
     @property
+    def picture(self) -> tuple[int, int]:
+        """Size of the picture, px."""
+        return (self.resolution[0] - 2 * self.margin, self.resolution[1] - 2 * self.margin)
+
+    @property
     def lit(self) -> bool:
-        return bool(self.rig.sources)
+        return bool(self.rig.sources) or (self.screen_sources and (self.emissive_light or not self.world_black))
+
+    @property
+    def emissive_light(self) -> bool:
+        """Whether what emits also lights."""
+        return self.emissive and self.settings.use_area_lights
+
+    @property
+    def screen_sources(self) -> bool:
+        """Whether the world and emissive surfaces light what they do on the screen, not as lights with maps."""
+        return self.settings.technique == "SSDO" and self.settings.ssdo.sources == "SCREEN"
+
+
+def voxels_shine(settings: Settings) -> bool:
+    """Whether the technique takes emission from voxels."""
+    return settings.technique == "VCT" and settings.vct.emissive_voxels and settings.use_area_lights
 
 
 def gather_facts(
@@ -62,23 +90,31 @@ def gather_facts(
     world: WorldMap | None,
     emitters: Emitters,
 ) -> Facts:
-    """Look at everything once."""
+    """Look at everything once. ``resolution`` is the picture's."""
+    margin = round(settings.ssdo.margin * max(resolution)) if settings.technique == "SSDO" else 0
     bounds = scene.bounds()
     s = settings
-    rig = build_rig(
-        scene.lights, bounds,
-        world=world, world_samples=s.world.samples,
-        emitters=emitters, emitter_samples=_EMITTER_SAMPLES, area_lights=s.use_area_lights,
-        shadows=s.use_shadows, bounces=s.use_indirect_diffuse and s.bounces > 0,
-        shadow_resolution=s.shadows.resolution, bounce_resolution=s.rsm.resolution,
-        world_resolution=s.world.resolution,
-    )  # fmt: skip
     seen = scene.instances.visibility & CAMERA if len(scene.instances) else np.zeros(0, "u4")
     used = {m for i, ms in enumerate(scene.instances.materials) if seen[i] for m in ms}
     some = [compiled[m] for m in used]
+    # Whatever looks at lit surfaces looks at the lights' bounce maps.
+    bounced = s.use_indirect_diffuse or (s.use_glossy and any(c.glossy for c in some))
+    bounced = bounced or (s.use_translucency and any(c.transmissive or c.subsurface for c in some))
+    from_screen = s.technique == "SSDO" and s.ssdo.sources == "SCREEN"
+    rig = build_rig(
+        scene.lights, bounds,
+        world=None if from_screen else world, world_samples=s.world.samples,
+        emitters=Emitters.none() if from_screen or voxels_shine(s) else emitters, emitter_samples=_EMITTER_SAMPLES,
+        area_lights=s.use_area_lights,
+        shadows=s.use_shadows and not (s.technique == "SSDO" and s.ssdo.shadows == "SCREEN"),
+        bounces=s.bounces > 0 and bounced and s.technique != "SSDO",
+        shadow_resolution=s.shadows.resolution, bounce_resolution=s.rsm.resolution,
+        world_resolution=s.world.resolution,
+    )  # fmt: skip
     return Facts(
         settings=s,
-        resolution=resolution,
+        resolution=(resolution[0] + 2 * margin, resolution[1] + 2 * margin),
+        margin=margin,
         outputs=outputs,
         subframes=subframes,
         rig=rig,
@@ -94,6 +130,8 @@ def gather_facts(
         layered=any(c.glossy or c.transmissive for c in compiled),
         world_black=world is None or world.black,
         ao_distance=s.ao.distance or scene.world.ao_distance,
+        world_visible=scene.world.visible_camera,
         medium=mean_medium(scene.world.graph, scene.images),
         stamps=scene.stamps(),
+        emitters=emitters,
     )

@@ -15,7 +15,7 @@ from .gpu_scene import GPUScene
 from .gpu_types import GENERATED, VIEW
 from .graph import Buffer, Planned, Texture
 from .lights import Sample
-from .scene import Camera
+from .scene import Camera, replace
 from .sequence import sobol_2d
 from .settings import Settings
 
@@ -105,7 +105,9 @@ class Frame:
     ) -> None:
         self.gl, self.pool, self.gpu = gl, pool, gpu
         self.settings, self.facts, self.resources, self.timers = settings, facts, resources, timers
-        self.camera, self.region, self.full = camera, region, full
+        self.camera, self.full = camera, full
+        margin = facts.margin
+        self.region = (region[0] - margin, region[1] - margin, region[2] + 2 * margin, region[3] + 2 * margin)
         self.subframe = 0
         self._view_buffer = view_buffer
         self._screen_vao = screen_vao
@@ -120,7 +122,9 @@ class Frame:
         self.subframe = subframe
         self._samples.clear()
         jitter = pixel_jitter(self.settings, subframe, self.facts.subframes)
-        self.view = view_uniforms(self.camera, self.region, self.full, jitter, subframe, self.facts)
+        camera = lens_camera(self.camera, subframe, self.facts.subframes)
+        self.view = view_uniforms(camera, self.region, self.full, jitter, subframe, self.facts)
+        self.view["margin"] = self.facts.margin
         self.view["film_transparent"] = float(self.film_transparent)
         self._view_buffer.write(self.view.tobytes())
         self._view_buffer.bind_to_uniform_block(0)
@@ -211,6 +215,37 @@ def pixel_jitter(settings: Settings, subframe: int, subframes: int) -> np.ndarra
     return (u - 0.5) * width
 
 
+def lens_camera(camera: Camera, subframe: int, subframes: int) -> Camera:
+    """The camera as seen from this sub-frame's point of its lens: the eye moves, what is in focus stays in its pixel."""
+    if camera.aperture <= 0.0 or subframes == 1:
+        return camera
+    x, y = lens_point(camera, sobol_2d(subframe, 2)) * camera.aperture
+    moved = np.asarray(camera.world_from_view, "f8").copy()
+    moved[:3, 3] += moved[:3, 0] * x + moved[:3, 1] * y
+    shear = np.eye(4)
+    # At depth −z = focus this takes back exactly the shift of the eye.
+    shear[0, 2], shear[1, 2] = -x / camera.focus, -y / camera.focus
+    return replace(camera, world_from_view=moved, clip_from_view=np.asarray(camera.clip_from_view, "f8") @ shear)
+
+
+def lens_point(camera: Camera, u: np.ndarray) -> np.ndarray:
+    """A point (2,) of the iris of radius 1 for ``u`` in [0, 1)²: a disc, or the polygon of its blades."""
+    if camera.blades < 3:
+        radius, angle = np.sqrt(u[0]), 2.0 * np.pi * u[1]
+        p = radius * np.array([np.cos(angle), np.sin(angle)])
+    else:
+        # One triangle about the centre is chosen; the rest of the number is as good as new.
+        blade = np.floor(u[0] * camera.blades)
+        a = np.sqrt(u[0] * camera.blades - blade)
+        half = np.pi / camera.blades
+        side = u[1] * a
+        corner = np.array([a * np.cos(half), (2.0 * side - a) * np.sin(half)])
+        turn = camera.blade_turn + 2.0 * half * blade
+        c, s = np.cos(turn), np.sin(turn)
+        p = np.array([c * corner[0] - s * corner[1], s * corner[0] + c * corner[1]])
+    return p / np.array([camera.blade_ratio, 1.0])
+
+
 def _blackman_harris_table() -> tuple[np.ndarray, np.ndarray]:
     x = np.linspace(-0.5, 0.5, 1025)
     t = 2.0 * np.pi * (x + 0.5)
@@ -236,7 +271,8 @@ def view_uniforms(
     subframe: int,
     facts: Facts,
 ) -> np.ndarray:
-    """VIEW of a sub-frame. ``region`` (x, y, width, height) in pixels of the ``full`` picture, row 0 at the bottom."""
+    """VIEW of a sub-frame. ``region`` (x, y, width, height) in pixels of the ``full`` picture, row 0 at the bottom; it may
+    reach beyond it."""
     view = np.zeros((), VIEW)
     x, y, width, height = region
     projection = np.asarray(camera.clip_from_view, "f8").copy()

@@ -36,6 +36,8 @@ _MAX_ATTRIBUTES = 4
 _CHUNK_TRIANGLES = 1024
 _CHUNKED_PLACES = 8
 _ANISOTROPY = 1.0
+# What a material's text has where it looks at its object: then vertices carry that along.
+_OBJECT_SPACE = ("_os", "generated", "object_", "point.object", "world_from_object", "map_object", "tangent_radial")
 
 
 @dataclass
@@ -302,9 +304,7 @@ class GPUScene:
     def _program(self, planned, stages, compiled: CompiledGraph | None, units: int, defines):
         with_material = compiled is not None
         glsl = compiled.glsl if compiled else ""
-        object_space = any(
-            word in glsl for word in ("_os", "generated", "object_", "point.object", "world_from_object", "map_object", "tangent_radial")
-        )  # fmt: skip
+        object_space = any(word in glsl for word in _OBJECT_SPACE)
         defines = {
             **planned.defines(),
             **defines,
@@ -467,7 +467,7 @@ def _morton(points: np.ndarray, bounds: np.ndarray) -> np.ndarray:
 
 def material_source(compiled: CompiledGraph, units: int) -> str:
     """``generated/material.glsl`` of a surface: its images, parameters, attributes and function."""
-    lines = ["#define SURFACE_IMPLICIT_LOD 1", *_param_lines(compiled)]
+    lines = ["#define WORLD_SUN_DISC 1", "#define SURFACE_IMPLICIT_LOD 1", *_param_lines(compiled)]
     lines += _image_lines(compiled, units)
     for slot in range(len(compiled.attributes)):
         if slot < _MAX_ATTRIBUTES:
@@ -480,9 +480,11 @@ def material_source(compiled: CompiledGraph, units: int) -> str:
     return "\n".join(lines)
 
 
-def world_source(compiled: CompiledGraph, units: int) -> str:
-    """``generated/world.glsl``: ``vec3 world_radiance(vec3 direction_ws)``."""
-    lines = ["#define SURFACE_IMPLICIT_LOD 0", *_param_lines(compiled)]  # worlds are evaluated in compute shaders
+def world_source(compiled: CompiledGraph, units: int, *, sun_disc: bool = True) -> str:
+    """``generated/world.glsl``: ``vec3 world_radiance(vec3 direction_ws)``; without ``sun_disc`` it leaves out suns that
+    are lights of their own."""
+    # Worlds are evaluated in compute shaders.
+    lines = [f"#define WORLD_SUN_DISC {int(sun_disc)}", "#define SURFACE_IMPLICIT_LOD 0", *_param_lines(compiled)]
     lines += _image_lines(compiled, units)
     lines += ['#include "lib/surface_lib.glsl"', '#include "nodes/math.glsl"', '#include "nodes/color.glsl"',
               '#include "nodes/texture.glsl"', *_includes(compiled), compiled.glsl]  # fmt: skip

@@ -20,6 +20,7 @@ VIEW = struct(
     ("forward_ws", "f4", 3), ("film_transparent", "f4"),
     ("resolution", "f4", 2), ("inverse_resolution", "f4", 2),
     ("pixel_offset", "i4", 2), ("subframe", "u4"), ("subframes", "u4"),
+    ("margin", "i4"), ("_pad0", "u4"), ("_pad1", "u4"), ("_pad2", "u4"),  # px drawn around the picture, within resolution
 )  # fmt: skip
 
 # One point of a light, good for one sub-frame. `kind` is one of the LIGHT_ constants; `emission` is irradiance (W/m²)
@@ -33,7 +34,7 @@ LIGHT = struct(
     ("v_ws", "f4", 3), ("spot_scale", "f4"),      # spot: 1 / ((1 − cos) blend)
     ("center_ws", "f4", 3), ("spread_tan", "f4"),  # of the whole light; tan of half the spread (area)
     ("patch_radius", "f4"), ("spread_scale", "f4"), ("shape", "i4"), ("flags", "i4"),
-    ("soft_radius2", "f4"), ("_pad0", "u4"), ("_pad1", "u4"), ("_pad2", "u4"),  # m², of a point's or spot's soft disc
+    ("soft_radius2", "f4"), ("diffuse", "f4"), ("glossy", "f4"), ("_pad0", "u4"),  # m², of a point's or spot's soft disc
 )  # fmt: skip
 LIGHT_SUN, LIGHT_POINT, LIGHT_SPOT, LIGHT_AREA, LIGHT_WORLD, LIGHT_MESH = range(6)
 LIGHT_FLAG_SHADOW, LIGHT_FLAG_BOUNCE, LIGHT_FLAG_CAMERA = 1, 2, 4

@@ -151,6 +151,7 @@ class LightRig:
     shadow: Maps
     bounce: Maps
     notes: list[str] = field(default_factory=list)
+    direct_world: WorldMap | None = None  # the same world, its directions drawn as suits direct light
 
     def moves(self, index: int, *, bounce: bool) -> bool:
         """Whether source ``index`` is another point in each sub-frame. Suns, spheres and discs bounce from their
@@ -175,7 +176,7 @@ class LightRig:
                 u = np.array([0.5, 0.5])
             else:
                 u = sobol_2d(subframe, source.seed)
-            self._place(lights[i], source, u, subframes)
+            self._place(lights[i], source, u, subframes, bounce=bounce)
             lights[i]["first_view"] = maps.first[i]
             if maps.first[i] < 0:
                 lights[i]["views"] = 0
@@ -219,13 +220,15 @@ class LightRig:
 
     # -- sources -------------------------------------------------------------------------------------------------
 
-    def _place(self, out: np.ndarray, source: Source, u: np.ndarray, subframes: int) -> None:
+    def _place(self, out: np.ndarray, source: Source, u: np.ndarray, subframes: int, *, bounce: bool) -> None:
         out["kind"] = source.kind
         out["views"] = source.views
         out["flags"] = LIGHT_FLAG_BOUNCE
+        out["diffuse"] = out["glossy"] = 1.0
         light = source.light
         if source.kind == LIGHT_WORLD:
-            direction, weight, pdf = self.world.sample(u[None])
+            world = self.world if bounce or self.direct_world is None else self.direct_world
+            direction, weight, pdf = world.sample(u[None])
             out["axis_ws"] = -direction[0]
             out["emission"] = weight[0] / source.count
             out["patch_radius"] = np.sqrt(1.0 / (np.pi * max(pdf[0], 1e-12) * source.count * subframes))
@@ -235,6 +238,7 @@ class LightRig:
         if source.kind == LIGHT_MESH:
             self._place_on_mesh(out, source, u, subframes)
             return
+        out["diffuse"], out["glossy"] = light.visible_diffuse, light.visible_glossy
         matrix = light.matrix
         center = matrix[:3, 3]
         x, y, z = (_unit(matrix[:3, k]) for k in range(3))
@@ -419,6 +423,9 @@ def build_rig(
     if len(emitters) and area_lights:
         sources += [Source(LIGHT_MESH, 12, None, 6, True, k, emitter_samples) for k in range(emitter_samples)]
 
+    radius = 0.5 * float(np.linalg.norm(bounds[1] - bounds[0]))
+    coarser = _coarser_maps({s.seed: _power(s.light, radius) for s in sources if s.light is not None})
+
     def tiles(resolution: int, used, *, bounce: bool) -> Maps:
         sizes: list[int] = []
         first: list[int] = []
@@ -431,6 +438,8 @@ def build_rig(
             if source.kind == LIGHT_WORLD:
                 # The sky's bounce needs no detail: its many directions blur it. Materials are dear to draw, depth is not.
                 base = min(resolution, world_resolution // 2 if bounce else world_resolution)
+            if bounce and source.light is not None:
+                base = max(16, base >> coarser[source.seed])
             size = base if source.views == 1 else base // 2
             sizes += [max(16, size)] * source.views
         while sum(s * s for s in sizes) > texel_budget and max(sizes) > 16:
@@ -438,18 +447,46 @@ def build_rig(
         corners, size = atlas.pack(sizes, power_of_two=True)
         return Maps(sizes, corners, size, first)
 
+    def bounced(source: Source) -> bool:
+        return bounces and (source.light is None or source.light.visible_diffuse)
+
     def own_shadow_map(source: Source) -> bool:
         if not shadows or (source.light is not None and not source.light.use_shadow):
             return False
         # What is drawn anew in each sub-frame anyway, at the very point that direct light comes from, is drawn once if
         # it is fine enough.
-        return not (bounces and source.kind in (LIGHT_AREA, LIGHT_MESH) and bounce_resolution >= shadow_resolution)
+        drawn_anew = source.kind in (LIGHT_AREA, LIGHT_MESH) and bounced(source)
+        coarse = source.light is not None and coarser[source.seed] > 0
+        return not (drawn_anew and bounce_resolution >= shadow_resolution and not coarse)
 
     return LightRig(
         sources, bounds, world, emitters,
-        tiles(shadow_resolution, own_shadow_map, bounce=False), tiles(bounce_resolution, lambda s: bounces, bounce=True),
+        tiles(shadow_resolution, own_shadow_map, bounce=False), tiles(bounce_resolution, bounced, bounce=True),
         notes,
     )  # fmt: skip
+
+
+# As many lamps have bounce maps of full resolution, whatever they shine; more share those texels by their power.
+_FULL_MAPS = 4
+
+
+def _power(light: Light, radius: float) -> float:
+    """Luminous power that a lamp sends into a scene of ``radius`` m, W."""
+    power = float(np.abs(light.emission) @ np.array([0.2126, 0.7152, 0.0722]))
+    if light.kind == "SUN":
+        return power * np.pi * radius**2
+    return power * (0.5 * (1.0 - np.cos(0.5 * light.spot_size)) if light.kind == "SPOT" else 1.0)
+
+
+def _coarser_maps(powers: dict[int, float]) -> dict[int, int]:
+    """By how many powers of two each lamp's bounce map is coarser: a texel of any stands for as much flux, and all maps
+    together have the texels of ``_FULL_MAPS``."""
+    total = sum(powers.values())
+    if len(powers) <= _FULL_MAPS or not total > 0.0:
+        return dict.fromkeys(powers, 0)
+    # Half the side is a fourth of the texels.
+    steps = {k: -0.5 * np.log2(max(_FULL_MAPS * p / total, 1e-6)) for k, p in powers.items()}
+    return {k: int(np.clip(np.floor(v), 0, 5)) for k, v in steps.items()}
 
 
 def _unit(v: np.ndarray) -> np.ndarray:

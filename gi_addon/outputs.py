@@ -61,6 +61,10 @@ LONG_NAMES = {o.short: o.name for o in OUTPUTS.values()}
 # such light in the scene. What these resources are (all full size, one texel a pixel):
 #   direct.diffuse, indirect.diffuse      radiance that a white Lambert surface would reflect, E/π, W/(m²·sr)
 #   direct.glossy, indirect.glossy        radiance that the glossy lobe reflects, with its colour
+#   reflected.sources                     what it reflects of the world and of emissive surfaces where rays find them, and they
+#                                         are not among the lights of direct.glossy
+#   subsurface.direct, .indirect          direct.diffuse and indirect.diffuse after scattering below the surface; alpha: the
+#                                         share of the surface's colour that they are for
 #   gbuffer.transmission                  tint of the refracting surfaces in front; 1 where there is none
 #   transmission.indirect                 radiance that arrives through them, tinted, where the technique knows it (alpha 1);
 #                                         elsewhere they show what is straight behind
@@ -69,22 +73,23 @@ LONG_NAMES = {o.short: o.name for o in OUTPUTS.values()}
 #   volume.transmittance                  that share by colour, where the technique knows it
 LAYERS: dict[str, tuple[str, ...]] = {
     "combined": (
-        "gbuffer.depth", "gbuffer.diffuse", "gbuffer.emission", "direct.diffuse", "direct.glossy", "indirect.diffuse",
-        "indirect.glossy", "gbuffer.transmission", "transmission.indirect", "volume.light", "volume.transmittance",
+        "gbuffer.depth", "gbuffer.diffuse", "gbuffer.emission", "direct.diffuse", "direct.glossy", "reflected.sources",
+        "indirect.diffuse", "indirect.glossy", "gbuffer.transmission", "transmission.indirect", "volume.light",
+        "volume.transmittance", "subsurface.direct", "subsurface.indirect",
     ),
     "depth": ("gbuffer.depth",),
     "normal": ("gbuffer.depth", "gbuffer.normal"),
-    "diffuse_direct": ("gbuffer.depth", "gbuffer.diffuse", "direct.diffuse", "volume.transmittance"),
-    "diffuse_indirect": ("gbuffer.depth", "gbuffer.diffuse", "indirect.diffuse", "volume.transmittance"),
+    "diffuse_direct": ("gbuffer.depth", "gbuffer.diffuse", "direct.diffuse", "subsurface.direct", "volume.transmittance"),
+    "diffuse_indirect": ("gbuffer.depth", "gbuffer.diffuse", "indirect.diffuse", "subsurface.indirect", "volume.transmittance"),
     "diffuse_color": ("gbuffer.depth", "gbuffer.diffuse", "volume.transmittance"),
-    "glossy_direct": ("gbuffer.depth", "direct.glossy", "volume.transmittance"),
+    "glossy_direct": ("gbuffer.depth", "direct.glossy", "reflected.sources", "volume.transmittance"),
     "glossy_indirect": ("gbuffer.depth", "indirect.glossy", "volume.transmittance"),
     "glossy_color": ("gbuffer.depth", "gbuffer.normal", "gbuffer.specular", "gbuffer.lobe", "brdf.albedo",
                      "brdf.average", "brdf.energy", "volume.transmittance"),
     "transmission_direct": ("gbuffer.depth", "gbuffer.transmission", "gbuffer.diffuse", "gbuffer.emission",
-                            "direct.diffuse", "direct.glossy", "volume.transmittance"),
+                            "direct.diffuse", "direct.glossy", "reflected.sources", "volume.transmittance"),
     "transmission_indirect": ("gbuffer.depth", "gbuffer.transmission", "gbuffer.diffuse", "gbuffer.emission",
-                              "direct.diffuse", "direct.glossy", "indirect.diffuse", "indirect.glossy",
+                              "direct.diffuse", "direct.glossy", "reflected.sources", "indirect.diffuse", "indirect.glossy",
                               "transmission.indirect", "volume.transmittance"),
     "transmission_color": ("gbuffer.depth", "gbuffer.transmission", "volume.transmittance"),
     "volume_direct": ("volume.light",),

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -189,7 +189,7 @@ class Renderer:
     def film(self) -> dict[str, np.ndarray]:
         """The film's layers so far, averaged: name -> (H, W, 4) f4."""
         texture = self.frame.resources["film"]
-        width, height = self.frame.facts.resolution
+        width, height = self.frame.facts.picture
         layers = self.frame.facts.layers
         data = np.frombuffer(texture.read(), np.float32).reshape(len(layers), height, width, 4)
         count = self.frame.subframe + 1
@@ -206,18 +206,29 @@ class Renderer:
         progress: Progress | None = None,
         cancel: CancelToken | None = None,
         timed: bool = False,
+        motion: Sequence[Scene] = (),
         **options,
     ) -> Result:
-        """A whole frame. ``options`` as in :meth:`begin`; raises Cancelled if ``cancel`` is set on the way."""
+        """A whole frame. ``options`` as in :meth:`begin`; raises Cancelled if ``cancel`` is set on the way.
+
+        ``motion`` are the scene's states while the shutter is open, evenly spread: each takes its share of the
+        sub-frames, one block after the other, so that what moved is sent to the GPU once per state.
+        """
         start = time.perf_counter()
         outputs = tuple(outputs)
         self.timers.enabled = timed
         self.timers.reset()
-        planned = self.begin(scene, settings, outputs, **options)
+        states = list(motion) or [scene]
+        planned = self.begin(states[0], settings, outputs, **options)
         subframes = self.frame.facts.subframes
+        shown = 0
         for index in range(subframes):
             if cancel is not None:
                 cancel.check()
+            state = index * len(states) // subframes
+            if state != shown:
+                self.begin(states[state], settings, outputs, **options)
+                shown = state
             self.subframe(index)
             # Software drivers run the queue when they like; without this a cancel would wait for all of it.
             if self.gl.software or index % 8 == 7:
@@ -263,7 +274,7 @@ class Renderer:
             "World Map",
             {"compute": "passes/world_map_comp.glsl"},
             prelude={"compute": "layout(binding = 0, rgba32f) writeonly uniform image2D world_map;"},
-            virtual={**GENERATED, "generated/world.glsl": world_source(world, 0)},
+            virtual={**GENERATED, "generated/world.glsl": world_source(world, 0, sun_disc=False)},
         )
         texture = self.gl.texture("world map", _WORLD_MAP, "rgba32f")
         # Image look-ups take their level of detail from the view.

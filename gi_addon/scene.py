@@ -150,7 +150,8 @@ class Light:
     """A Blender light with Cycles' units.
 
     ``emission`` (3,): power Φ in W for POINT, SPOT and AREA, irradiance in W/m² for SUN, after colour, temperature and
-    exposure. ``matrix`` (4, 4): world from light; light shines along -Z. ``radius``: soft size in m (POINT, SPOT);
+    exposure. ``visible_…``: whether the camera and which lobes of surfaces see it. ``matrix`` (4, 4): world from light; light
+    shines along -Z. ``radius``: soft size in m (POINT, SPOT);
     ``angle``: full angular diameter (SUN), rad; ``spot_size`` full cone angle, rad; ``size`` (2,): width and height in
     object units; ``spread``: rad.
     """
@@ -169,13 +170,16 @@ class Light:
     soft_falloff: bool = True
     use_shadow: bool = True
     visible_camera: bool = True
+    visible_diffuse: bool = True
+    visible_glossy: bool = True
 
 
 @dataclass
 class Camera:
     """``world_from_view`` (4, 4), looking along -Z; ``clip_from_view`` (4, 4), OpenGL clip space, without jitter.
 
-    Depth of field (perspective only): ``aperture`` radius of the lens in m (0 = pinhole), focused at ``focus`` m.
+    Depth of field: ``aperture`` radius of the lens in m (0 = pinhole), focused at ``focus`` m along the view; ``blades`` of
+    its iris (below 3: round), turned by ``blade_turn`` rad; ``blade_ratio`` is how much higher than wide it is.
     """
 
     world_from_view: np.ndarray
@@ -185,6 +189,9 @@ class Camera:
     aperture: float = 0.0
     focus: float = 10.0
     name: str = "Camera"
+    blades: int = 0
+    blade_turn: float = 0.0
+    blade_ratio: float = 1.0
 
     @property
     def orthographic(self) -> bool:

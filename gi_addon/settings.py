@@ -55,6 +55,8 @@ def _group(cls: type) -> Any:
 TECHNIQUES = (
     ("RSM", "Reflective Shadow Maps", "One bounce gathered from virtual point lights on what the lights see"),
     ("LPV", "Light Propagation Volumes", "Bounces carried through a grid of cells over the scene"),
+    ("VCT", "Voxel Cone Tracing", "Bounces gathered by cones through a grid of lit cells"),
+    ("SSDO", "Screen-Space Directional Occlusion", "Bounces gathered from what the camera sees"),
 )
 
 
@@ -105,6 +107,10 @@ class WorldSettings:
     resolution: int = _setting(
         512, "Resolution", "Texels along one side of those shadow maps", low=64, high=4096, unit="px",
         higher="finer openings", lower="faster, leaks through small walls",
+    )  # fmt: skip
+    aimed: bool = _setting(
+        True, "Aim at Openings", "Draw the directions of direct light mostly from the parts of the sky that visible "
+        "surfaces see, from four sub-frames on",
     )  # fmt: skip
 
 
@@ -169,6 +175,90 @@ class LPVSettings:
 
 
 @dataclass
+class SSDOSettings:
+    """Screen-space directional occlusion (Ritschel, Grosch and Seidel 2009)."""
+
+    samples: int = _setting(
+        512, "Samples", "Points tested in the depth buffer per gathering pixel, sub-frame and bounce", low=8, high=4096,
+        higher="less noise", lower="faster",
+    )  # fmt: skip
+    steps: int = _setting(
+        32, "Steps", "How many of the samples lie along one ray, or on one side of one slice", low=2, high=256,
+        higher="finds thin and far things; fewer directions", lower="more directions; misses small things",
+    )  # fmt: skip
+    integrator: str = _setting(
+        "RAYS", "Integrator", "How directions are covered",
+        choices=(("RAYS", "Rays", "Cosine-distributed rays, each followed to its first hit"),
+                 ("BITMASK", "Visibility Bitmask", "Slices of the hemisphere in 32 sectors that samples fill")),
+    )  # fmt: skip
+    radius: float = _setting(
+        0.0, "Radius", "How far away light is gathered from; 0 is everywhere on the screen", low=0.0, high=1e6,
+        soft_high=100.0, unit="m", higher="light from farther away", lower="finer near by, dark rooms",
+    )  # fmt: skip
+    thickness: float = _setting(
+        0.5, "Thickness", "How thick what the screen shows is taken to be, as a share of its distance from the receiver",
+        low=0.01, high=10.0, higher="fewer leaks behind things", lower="light passes behind thin things",
+    )  # fmt: skip
+    occlusion: str = _setting(
+        "BITMASK", "Ambient Occlusion", "How the Ambient Occlusion pass is made",
+        choices=(("BITMASK", "Visibility Bitmask", "Sectors of slices that samples fill"),
+                 ("MITTRING", "Mittring", "Points along directions, as the other techniques and the paper do")),
+    )  # fmt: skip
+    shadows: str = _setting(
+        "MAPS", "Shadows", "Where shadows come from",
+        choices=(("MAPS", "Shadow Maps", "What every light sees"),
+                 ("CONTACT", "Maps and Contacts", "Shadow maps, and short rays through the depth buffer over them"),
+                 ("SCREEN", "Screen", "Rays through the depth buffer alone: what is not in the picture throws no shadow")),
+    )  # fmt: skip
+    contact: float = _setting(
+        0.02, "Contact", "Length of the rays for contact shadows, as a share of the scene's radius", low=0.0, high=2.0,
+        higher="longer fine shadows", lower="only where things touch",
+    )  # fmt: skip
+    volumetric: str = _setting(
+        "MARCH", "Volumetric", "How light in the air is shadowed",
+        choices=(("MARCH", "Shadow Maps", "Points on each pixel's ray are looked up in the lights' maps"),
+                 ("RADIAL", "Radial Blur", "The share of the screen between a pixel and the light that does not hide it; the "
+                  "light must be in the picture")),
+    )  # fmt: skip
+    margin: float = _setting(
+        0.0, "Margin", "How much is drawn beyond each side of the picture, as a share of its longer side: what lies there "
+        "still counts", low=0.0, high=1.0, higher="light from just outside", lower="faster",
+    )  # fmt: skip
+    sources: str = _setting(
+        "MAPS", "World and Emitters", "How the world and emissive surfaces light the scene",
+        choices=(("MAPS", "Shadow Maps", "As lights with shadow maps, on and off the screen"),
+                 ("SCREEN", "Screen", "Directional occlusion: directions that meet nothing on the screen see the world, the "
+                  "others the emissive pixels")),
+    )  # fmt: skip
+
+
+@dataclass
+class VCTSettings:
+    """Voxel cone tracing (Crassin et al. 2011)."""
+
+    resolution: int = _setting(
+        64, "Resolution", "Cells along the longest side of the voxel grid", low=16, high=512,
+        higher="thinner walls hold, finer bounce light", lower="faster, less memory",
+    )  # fmt: skip
+    cones: int = _setting(
+        6, "Cones", "Cones traced from each point into its hemisphere and sub-frame", low=1, high=64,
+        higher="finer directions, sharper contact", lower="faster, blurrier",
+    )  # fmt: skip
+    shadow_cones: bool = _setting(
+        False, "Shadow Cones", "Direct light's shadows by cones through the voxels in place of shadow maps: soft at one sub-frame, "
+        "as fine as the grid",
+    )  # fmt: skip
+    emissive_voxels: bool = _setting(
+        False, "Emissive Voxels", "Emissive surfaces shine out of the voxels, into the indirect passes: any number of them "
+        "without noise, as fine as the grid; else lights are drawn from them, into the direct passes",
+    )  # fmt: skip
+    continuous_voxelization: bool = _setting(
+        False, "Continuous Voxelization", "Voxelize in every sub-frame, as the paper's Table 2 has it; else only when a "
+        "mesh, a transform or a material has changed. Light is always injected anew when it changes",
+    )  # fmt: skip
+
+
+@dataclass
 class Settings:
     """All of ``scene.quartet``."""
 
@@ -187,6 +277,10 @@ class Settings:
     viewport_samples: int = _setting(
         16, "Viewport Samples", "Sub-frames averaged in the viewport while nothing changes", low=1, high=65536,
         soft_high=256, higher="smoother after a while", lower="settles sooner",
+    )  # fmt: skip
+    motion_steps: int = _setting(
+        8, "Motion Steps", "Times at which the scene is read while the shutter is open, with motion blur switched on; the "
+        "sub-frames are shared among them", low=1, high=256, higher="smoother streaks, longer sync", lower="faster; 1 is sharp",
     )  # fmt: skip
     bounces: int = _setting(
         1, "Bounces", "Diffuse bounces of light, as far as the technique can; 1 is the paper's", low=0, high=16,
@@ -211,6 +305,8 @@ class Settings:
     volume: VolumeSettings = _group(VolumeSettings)
     rsm: RSMSettings = _group(RSMSettings)
     lpv: LPVSettings = _group(LPVSettings)
+    vct: VCTSettings = _group(VCTSettings)
+    ssdo: SSDOSettings = _group(SSDOSettings)
 
     # -- access by dotted name ---------------------------------------------------------------------------------
 

@@ -3,7 +3,11 @@
 
 from __future__ import annotations
 
+from copy import copy
+
 import numpy as np
+
+_GUIDED = 0.75  # share of the directions that a guide has a say in
 
 
 class WorldMap:
@@ -21,11 +25,32 @@ class WorldMap:
         weight = (self.radiance @ np.array([0.2126, 0.7152, 0.0722])) * self.solid_angle
         self.total = float(weight.sum())
         if self.total > 0.0:
-            rows = weight.sum(axis=1)
-            self._row_cdf = np.concatenate([[0.0], np.cumsum(rows)]) / rows.sum()
-            safe = np.where(rows > 0.0, rows, 1.0)[:, None]
-            self._column_cdf = np.concatenate([np.zeros((height, 1)), np.cumsum(weight, axis=1) / safe], axis=1)
-            self.probability = weight / self.total
+            self._draw_by(weight / self.total)
+
+    def _draw_by(self, probability: np.ndarray) -> None:
+        rows = probability.sum(axis=1)
+        self._row_cdf = np.concatenate([[0.0], np.cumsum(rows)]) / rows.sum()
+        safe = np.where(rows > 0.0, rows, 1.0)[:, None]
+        zeros = np.zeros((len(rows), 1))
+        self._column_cdf = np.concatenate([zeros, np.cumsum(probability, axis=1) / safe], axis=1)
+        self.probability = probability
+
+    def guided(self, visible: np.ndarray) -> WorldMap:
+        """The same world, directions drawn by luminance × ``visible`` (rows, columns): a share in [0, 1] per bin of equal
+        angles, laid out as the map. A quarter is still drawn by luminance alone, so that no direction weighs more than
+        four times what it does without a guide, however wrong the guide is."""
+        if self.black:
+            return self
+        height, width = self.probability.shape
+        rows, columns = visible.shape
+        row = (np.arange(height) + 0.5) / height * rows
+        column = (np.arange(width) + 0.5) / width * columns
+        weight = self.probability * visible[row.astype(int)[:, None], column.astype(int)[None, :]]
+        if weight.sum() <= 0.0:
+            return self
+        guided = copy(self)
+        guided._draw_by(_GUIDED * weight / weight.sum() + (1.0 - _GUIDED) * self.probability)
+        return guided
 
     @property
     def black(self) -> bool:

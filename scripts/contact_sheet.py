@@ -38,10 +38,10 @@ def one(arguments) -> None:
     scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = width, height, 100
     scene.render.use_border = False
     target = arguments.output / name_of(arguments.one)
-    reference = target.with_suffix(f".cycles.{arguments.resolution}.npy")
+    reference = target.with_suffix(f".cycles{suffix(arguments)}.npy")
     if not reference.is_file():
         # What a user would compare with: many bounces, denoised, nothing clamped, a fixed seed.
-        set_up(scene, Reference(12, arguments.cycles_samples, unbiased=True, denoise=True))
+        set_up(scene, Reference(arguments.bounces, arguments.cycles_samples, unbiased=True, denoise=True))
         start = time.perf_counter()
         image = render_passes(scene, ["Combined"])["Combined"][..., :3]
         np.save(reference, image)
@@ -77,6 +77,11 @@ def one(arguments) -> None:
     gi_addon.unregister()
 
 
+def suffix(arguments) -> str:
+    """What tells one kind of Cycles picture from another in a file's name."""
+    return (f".{arguments.bounces}" if arguments.bounces != 12 else "") + f".{arguments.resolution}"
+
+
 def name_of(path: Path) -> str:
     return f"{path.parent.name}-{path.stem}"
 
@@ -90,6 +95,8 @@ def main() -> None:
     parser.add_argument("--set", action="append", default=[])
     parser.add_argument("--resolution", default="320x180")
     parser.add_argument("--cycles-samples", type=int, default=64)
+    parser.add_argument("--bounces", type=int, default=12, help="of Cycles; 1 is what one-bounce techniques approximate")
+    parser.add_argument("--compose", action="store_true", help="only put what is rendered already on a sheet")
     parser.add_argument("--only", default="", help="part of a scene's name")
     parser.add_argument("-o", "--output", type=Path, required=True)
     arguments = parser.parse_args()
@@ -99,10 +106,11 @@ def main() -> None:
         return
     paths = sorted(p for p in arguments.scenes.rglob("*") if p.suffix in SUFFIXES and arguments.only in name_of(p))
     rows = []
-    for path in paths:
+    for path in paths if not arguments.compose else ():
         command = [sys.executable, __file__, "--one", str(path), "--technique", arguments.technique,
                    "--samples", str(arguments.samples), "--resolution", arguments.resolution,
-                   "--cycles-samples", str(arguments.cycles_samples), "-o", str(arguments.output)]  # fmt: skip
+                   "--cycles-samples", str(arguments.cycles_samples), "--bounces", str(arguments.bounces),
+                   "-o", str(arguments.output)]  # fmt: skip
         for assignment in arguments.set:
             command += ["--set", assignment]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -111,6 +119,8 @@ def main() -> None:
         rows.append((path, done.returncode))
         if arguments.technique != "none" and done.returncode == 0:
             print(line(path, arguments), flush=True)
+    if arguments.compose:
+        rows = [(p, 0) for p in paths if (arguments.output / f"{name_of(p)}.{arguments.technique}.json").is_file()]
     if arguments.technique != "none":
         write_sheet([p for p, code in rows if code == 0], arguments)
 
@@ -122,7 +132,7 @@ def results(path: Path, arguments):
     target = arguments.output / name_of(path)
     facts = json.loads(target.with_suffix(f".{arguments.technique}.json").read_text())
     test = np.load(target.with_suffix(f".{arguments.technique}.npy"))
-    reference = np.load(target.with_suffix(f".cycles.{arguments.resolution}.npy"))
+    reference = np.load(target.with_suffix(f".cycles{suffix(arguments)}.npy"))
     return facts, test, reference, score(test, reference, flip=True)
 
 

@@ -142,12 +142,17 @@ def site() -> Path:
     return folder / "site"
 
 
-def run(script: str, tmp_path: Path, *options: str, timeout: int = 600) -> dict:
+def run(script: str, tmp_path: Path, *options: str, timeout: int = 600, profile: Path | None = None, **environment) -> dict:
     """Run ``script`` in the real Blender; it calls ``report(**values)``, which come back. Fails with Blender's output when
-    it does not."""
+    it does not.
+
+    It sees this checkout and the libraries it needs; with ``profile``, a folder of user settings, it sees only what is
+    installed there.
+    """
     need()
     answer = tmp_path / "report.json"
-    paths = [str(ROOT), str(site())]
+    answer.unlink(missing_ok=True)
+    paths = [str(ROOT), str(site())] if profile is None else []
     code = _PREAMBLE.format(paths=paths, report=str(answer)) + script
     path = tmp_path / "script.py"
     path.write_text(code)
@@ -155,17 +160,19 @@ def run(script: str, tmp_path: Path, *options: str, timeout: int = 600) -> dict:
     cache = CACHE / "mesa"
     cache.mkdir(parents=True, exist_ok=True)
     done = subprocess.run(
-        [str(TOOL), *options, "--factory-startup", "--python-exit-code", "1", "-P", str(path)],
-        capture_output=True, text=True, timeout=timeout, env={**os.environ, "MESA_SHADER_CACHE_DIR": str(cache)},
+        [str(TOOL), *options, *(["--factory-startup"] if profile is None else []), "--python-exit-code", "1", "-P", str(path)],
+        capture_output=True, text=True, timeout=timeout,
+        env={**os.environ, "MESA_SHADER_CACHE_DIR": str(cache), **environment,
+             **({"BLENDER_USER_RESOURCES": str(profile)} if profile else {})},
     )  # fmt: skip
     if not answer.exists():
         pytest.fail(f"Blender gave no report (exit {done.returncode}):\n{done.stdout[-4000:]}\n{done.stderr[-4000:]}")
     return json.loads(answer.read_text())
 
 
-def run_window(steps: str, tmp_path: Path, *options: str, size: str = "1000x700", timeout: int = 300) -> dict:
+def run_window(steps: str, tmp_path: Path, *options: str, size: str = "1000x700", timeout: int = 600) -> dict:
     """Run the generator ``steps()`` in a window of the real Blender; see ``_WINDOW`` for what it has at hand."""
-    code = "import gi_addon\ngi_addon.register()\n" + steps + _WINDOW.replace("{patience}", "90")
+    code = "import gi_addon\ngi_addon.register()\n" + steps + _WINDOW.replace("{patience}", "150")
     answer = run(code, tmp_path, "--window", size, *options, timeout=timeout)
     if "error" in answer:
         pytest.fail(answer["error"])

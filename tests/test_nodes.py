@@ -121,7 +121,7 @@ def make(tree, kind: str, output, sockets=(), **settings):
     for name, value in settings.items():
         setattr(node, name, value)
     for name, value in dict(sockets).items():
-        socket = next(s for s in node.inputs if s.identifier == name or s.name == name and s.enabled)
+        socket = next(s for s in node.inputs if s.identifier == name or (s.name == name and s.enabled))
         if hasattr(value, "is_output"):
             tree.links.new(value, socket)
         else:
@@ -365,8 +365,8 @@ def test_map_range_clamp_rotate_mapping_and_transform(blender, gl):
                                           clamp_type=kind))  # fmt: skip
     for kind, invert in itertools.product(("AXIS_ANGLE", "X_AXIS", "Y_AXIS", "Z_AXIS", "EULER_XYZ"), (False, True)):
         sockets = {"Center": (0.2, -0.1, 0.3), "Axis": (0.3, 1.0, -0.4), "Angle": 0.8, "Rotation": (0.4, -0.7, 1.1)}
-        sockets = {k: v for k, v in sockets.items() if k == "Center" or (k == "Rotation") == (kind == "EULER_XYZ")
-                   and (k != "Axis" or kind == "AXIS_ANGLE")}  # fmt: skip
+        sockets = {k: v for k, v in sockets.items() if k == "Center" or ((k == "Rotation") == (kind == "EULER_XYZ")
+                   and (k != "Axis" or kind == "AXIS_ANGLE"))}  # fmt: skip
         grid.color(f"rotate {kind} {invert}", case("VectorRotate", "Vector", sockets, rotation_type=kind, invert=invert))
     for kind in ("POINT", "TEXTURE", "VECTOR", "NORMAL"):
         sockets = {"Location": (0.2, -0.3, 0.1), "Rotation": (0.4, -0.7, 1.1), "Scale": (1.5, 0.6, -0.8)}
@@ -485,7 +485,7 @@ def test_udim_tiles_are_told_apart(blender, gl, tmp_path):
         return make(tree, "TexImage", "Color", {"Vector": coordinate("UV", 2.9, (0.02, 0.02, 0.0))(tree)}, image=image)
 
     grid.color("udim", tiled)
-    scene, groups, _ = grid.build()
+    scene, _, _ = grid.build()
     test, reference = both(scene)
     pictures_to("nodes", "udim", test=test, reference=reference)
     # Tiles' borders blend differently: a pixel's width of each.
@@ -493,3 +493,53 @@ def test_udim_tiles_are_told_apart(blender, gl, tmp_path):
     magenta = np.abs(test - (1.25, 1.0, 1.25)).max(-1) < 1e-3
     assert (magenta == (np.abs(reference - (1.25, 1.0, 1.25)).max(-1) < 1e-3)).mean() > 0.9
     assert magenta.any() and not magenta.all()
+
+
+# --- skies ------------------------------------------------------------------------------------------------------------
+
+
+def test_a_sky_shines_as_in_cycles(blender, gl):
+    """Each model of the Sky Texture this Blender has, turned, with its sun: what the camera sees of it, and the light it gives
+    a plane. The sun is a light of its own in Quartet; its disc is wide here, so that pixels resolve it."""
+    from gi_addon.compare.metrics import score
+    from gi_addon.host.compat import node_tree
+    from gi_addon.host.cycles import Reference, render_passes, set_up
+
+    bpy = blender
+    models = [i.identifier for i in bpy.types.ShaderNodeTexSky.bl_rna.properties["sky_type"].enum_items]
+    for model in [m for m in models if m != "HOSEK_WILKIE"]:
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        scene = bpy.context.scene
+        scene.world = bpy.data.worlds.new("W")
+        tree = node_tree(scene.world)
+        tree.nodes.clear()
+        out, background = tree.nodes.new("ShaderNodeOutputWorld"), tree.nodes.new("ShaderNodeBackground")
+        sky = make(tree, "TexSky", "Color", sky_type=model, sun_disc=True, sun_elevation=0.5, sun_rotation=0.6,
+                   altitude=200.0, sun_size=0.2, sun_direction=(0.4, 0.7, 0.5))  # fmt: skip
+        background.inputs["Strength"].default_value = 0.3
+        tree.links.new(sky, background.inputs["Color"])
+        tree.links.new(background.outputs[0], out.inputs[0])
+        mesh = bpy.data.meshes.new("P")
+        mesh.from_pydata([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], [], [(0, 1, 2, 3)])
+        plane = bpy.data.objects.new("P", mesh)
+        plane.location.z = -0.5
+        scene.collection.objects.link(plane)
+        camera = bpy.data.cameras.new("C")
+        camera.angle = 2.2
+        scene.camera = bpy.data.objects.new("C", camera)
+        scene.camera.rotation_euler = (math.radians(95), 0, -0.4)
+        scene.collection.objects.link(scene.camera)
+        scene.render.resolution_x, scene.render.resolution_y = 48, 30
+        scene.render.engine = "QUARTET"
+        scene.quartet.samples = 8
+        names = ["Environment", "Diffuse Direct"]
+        test = render_passes(scene, names)
+        set_up(scene, Reference(0, 48, 1))
+        scene.cycles.max_bounces = 0
+        reference = render_passes(scene, names)
+        for name in names:
+            s = score(test[name], reference[name])
+            pictures_to("sky", f"{model}-{name}", test=test[name], reference=reference[name])
+            # A sub-frame lights by a few directions of the sky: eight of them have that noise.
+            gain, error = (0.04, 0.02) if name == "Diffuse Direct" else (0.02, 0.003)
+            assert abs(s.gain - 1.0) < gain and s.rel_mse < error, f"{model} {name}: {s.text()}"

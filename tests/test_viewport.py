@@ -51,6 +51,8 @@ def steps():
     yield from changed("material")
     bpy.data.lights["Spot"].energy = 400.0
     yield from changed("light")
+    scene.quartet.rsm.samples = 150
+    yield from changed("setting")
     mesh = scene.objects["White"].data
     mesh.vertices[0].co.x -= 0.3
     mesh.update()
@@ -205,7 +207,8 @@ def sent(session, before, after):
         ("move", "select", 0, {"transforms"}),
         ("material", "move", 0, {"materials"}),
         ("light", "material", 0, set()),
-        ("mesh", "light", 1, {"meshes", "transforms"}),
+        ("setting", "light", 0, set()),
+        ("mesh", "setting", 1, {"meshes", "transforms"}),
     ],
 )
 def test_only_what_changed_is_read_and_sent(session, change, before, meshes, kinds):
@@ -218,6 +221,11 @@ def test_only_what_changed_is_read_and_sent(session, change, before, meshes, kin
 def test_selecting_starts_nothing_over(session):
     assert session["select"]["restarts"] == session["start"]["restarts"]
     assert session["select"]["subframes"] == session["start"]["subframes"]
+
+
+@pytest.mark.realblender
+def test_a_setting_shows_at_once(session):
+    assert session["setting"]["restarts"] == session["light"]["restarts"] + 1
 
 
 @pytest.mark.realblender

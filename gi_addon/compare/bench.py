@@ -110,10 +110,15 @@ class Timing:
             return {}
         median = float(np.median(self.moving))
         return {
-            "ms": median, "mad": float(np.median(np.abs(np.array(self.moving) - median))),
-            "p95": float(np.percentile(self.moving, 95)), "worst": max(self.moving), "mean": float(np.mean(self.moving)),
-            "still_ms": float(np.median(self.still)), "fps": 1e3 / median, "still_fps": 1e3 / float(np.median(self.still)),
-        }  # fmt: skip
+            "ms": median,
+            "mad": float(np.median(np.abs(np.array(self.moving) - median))),
+            "p95": float(np.percentile(self.moving, 95)),
+            "worst": max(self.moving),
+            "mean": float(np.mean(self.moving)),
+            "still_ms": float(np.median(self.still)),
+            "fps": 1e3 / median,
+            "still_fps": 1e3 / float(np.median(self.still)),
+        }
 
 
 def bench_settings(row: Row) -> Settings:
@@ -165,9 +170,7 @@ def bench(
     def job(gl: GL) -> tuple[Calibration, list[Timing]]:
         count = frames or (5 if gl.software else 50)
         calibration = calibrate(gl)
-        timings = [
-            Timing(r, (max(1, round(r.resolution[0] * scale)), max(1, round(r.resolution[1] * scale)))) for r in chosen
-        ]
+        timings = [Timing(r, (max(1, round(r.resolution[0] * scale)), max(1, round(r.resolution[1] * scale)))) for r in chosen]
         renderer = Renderer(gl)
         steps = iter(range(1, 1 << 30))
 
@@ -225,13 +228,23 @@ def records(calibration: Calibration, timings: list[Timing]) -> list[dict]:
     for t in timings:
         s = t.summary()
         fps = s.get("fps")
-        out.append({
-            "technique": t.row.technique, "setting": t.row.label, "paper_resolution": "{}x{}".format(*t.row.resolution),
-            "resolution": "{}x{}".format(*t.size), "paper_fps": t.row.fps, "paper_doubtful": t.row.doubtful, **s,
-            "ratio": fps / t.row.fps if fps and t.row.fps else None,
-            "ratio_per_hardware": fps / t.row.fps / calibration.ratio if fps and t.row.fps else None,
-            "planned_mib": t.planned_mib, "held_mib": t.held_mib, "passes": t.passes, "problem": t.problem,
-        })  # fmt: skip
+        out.append(
+            {
+                "technique": t.row.technique,
+                "setting": t.row.label,
+                "paper_resolution": "{}x{}".format(*t.row.resolution),
+                "resolution": "{}x{}".format(*t.size),
+                "paper_fps": t.row.fps,
+                "paper_doubtful": t.row.doubtful,
+                **s,
+                "ratio": fps / t.row.fps if fps and t.row.fps else None,
+                "ratio_per_hardware": fps / t.row.fps / calibration.ratio if fps and t.row.fps else None,
+                "planned_mib": t.planned_mib,
+                "held_mib": t.held_mib,
+                "passes": t.passes,
+                "problem": t.problem,
+            }
+        )
     return out
 
 
@@ -242,10 +255,17 @@ def write(folder: Path, scene_name: str, scale: float, calibration: Calibration,
     folder.mkdir(parents=True, exist_ok=True)
     rows = records(calibration, timings)
     files = [folder / name for name in ("bench.json", "bench.csv", "bench.html")]
-    head = {"version": __version__, "driver": driver(), "scene": scene_name, "scale": scale,
-            "calibration": {**asdict(calibration), "settled": calibration.settled, "hardware_ratio": calibration.ratio},
-            "gtx_1070": GTX_1070}  # fmt: skip
-    files[0].write_text(dump({**head, "rows": rows, "frames": {t.row.key: {"moving": t.moving, "still": t.still} for t in timings}}))
+    head = {
+        "version": __version__,
+        "driver": driver(),
+        "scene": scene_name,
+        "scale": scale,
+        "calibration": {**asdict(calibration), "settled": calibration.settled, "hardware_ratio": calibration.ratio},
+        "gtx_1070": GTX_1070,
+    }
+    files[0].write_text(
+        dump({**head, "rows": rows, "frames": {t.row.key: {"moving": t.moving, "still": t.still} for t in timings}})
+    )
     columns = [k for k in max(rows, key=len) if k != "passes"] if rows else []
     with files[1].open("w", newline="") as stream:
         writer = csv.DictWriter(stream, columns, extrasaction="ignore")
@@ -259,22 +279,63 @@ def write(folder: Path, scene_name: str, scale: float, calibration: Calibration,
         "case). Still: what can be kept is kept. ms are medians of interleaved frames (A B … B A), ± the median absolute "
         "deviation. A ratio at another picture size than the paper's is no statement about speed; ratios between rows are.</p>",
         table(
-            ["technique", "setting", "paper at", "paper fps", "here at", "fps moving", "ms moving", "± MAD", "P95", "ms still",
-             "× paper", "× paper per hardware", "MiB planned", "MiB held", "costliest passes, ms"],
-            [[r["technique"], r["setting"], r["paper_resolution"],
-              "–" if r["paper_fps"] is None else f"{r['paper_fps']:g}{'?' if r['paper_doubtful'] else ''}", r["resolution"],
-              *([r.get(k) for k in ("fps", "ms", "mad", "p95", "still_ms", "ratio", "ratio_per_hardware", "planned_mib", "held_mib")]
-                if r.get("ms") else [r["problem"] or "–", *[""] * 8]),
-              ", ".join(f"{k} {v:.2f}" for k, v in sorted(r["passes"].items(), key=lambda i: -i[1])[:4])] for r in rows],
+            [
+                "technique",
+                "setting",
+                "paper at",
+                "paper fps",
+                "here at",
+                "fps moving",
+                "ms moving",
+                "± MAD",
+                "P95",
+                "ms still",
+                "× paper",
+                "× paper per hardware",
+                "MiB planned",
+                "MiB held",
+                "costliest passes, ms",
+            ],
+            [
+                [
+                    r["technique"],
+                    r["setting"],
+                    r["paper_resolution"],
+                    "–" if r["paper_fps"] is None else f"{r['paper_fps']:g}{'?' if r['paper_doubtful'] else ''}",
+                    r["resolution"],
+                    *(
+                        [
+                            r.get(k)
+                            for k in (
+                                "fps",
+                                "ms",
+                                "mad",
+                                "p95",
+                                "still_ms",
+                                "ratio",
+                                "ratio_per_hardware",
+                                "planned_mib",
+                                "held_mib",
+                            )
+                        ]
+                        if r.get("ms")
+                        else [r["problem"] or "–", *[""] * 8]
+                    ),
+                    ", ".join(f"{k} {v:.2f}" for k, v in sorted(r["passes"].items(), key=lambda i: -i[1])[:4]),
+                ]
+                for r in rows
+            ],
         ),
-    ]  # fmt: skip
+    ]
     files[2].write_text(document("Quartet Table 2", "".join("–" if b is None else b for b in body), charts=False))
     return files
 
 
 def hardware_text(c: Calibration) -> str:
     """The calibration in a sentence."""
-    state = f"varied by {100 * c.variation:.1f} %" + ("" if c.settled else f" still after {c.runs} runs: times are unsettled, trust ratios only")
+    state = f"varied by {100 * c.variation:.1f} %" + (
+        "" if c.settled else f" still after {c.runs} runs: times are unsettled, trust ratios only"
+    )
     return (
         f"Calibration kernel {c.milliseconds:.2f} ms ({c.gflops:.1f} GFLOP/s, {c.gbytes:.1f} GB/s), {state}. "
         f"This machine is {c.ratio:.3g} × the paper's GTX 1070 ({GTX_1070['gflops']:.0f} GFLOP/s, {GTX_1070['gbytes']:.0f} GB/s)."

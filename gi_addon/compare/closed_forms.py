@@ -60,8 +60,9 @@ def visible_share(camera: Camera, radius: float, power: float, lamp: np.ndarray,
     to_lamp = lamp - points
     d2 = np.sum(to_lamp**2, -1)
     direct = power / (4 * np.pi * d2) * np.maximum(0.0, np.sum(-unit * to_lamp, -1)) / np.sqrt(d2)
-    clip = np.concatenate([points, np.ones((count, 1))], -1) @ (
-        np.asarray(camera.clip_from_view, "f8") @ np.linalg.inv(np.asarray(camera.world_from_view, "f8"))
-    ).T
+    clip = (
+        np.concatenate([points, np.ones((count, 1))], -1)
+        @ (np.asarray(camera.clip_from_view, "f8") @ np.linalg.inv(np.asarray(camera.world_from_view, "f8"))).T
+    )
     seen = (clip[:, 3] > 0) & (np.abs(clip[:, :2]) <= clip[:, 3:]).all(-1)
     return float(direct[seen].sum() / direct.sum())

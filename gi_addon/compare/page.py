@@ -9,6 +9,7 @@ import io
 import json
 import math
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,31 +17,19 @@ import numpy as np
 from .sheet import srgb
 
 # Okabe and Ito's colours, told apart with any colour vision.
-COLORS = {"RSM": "#0072B2", "LPV": "#009E73", "VCT": "#D55E00", "SSDO": "#CC79A7", "HYBRID": "#E69F00", "AUTO": "#56B4E9",
-          "Cycles": "#555555", "Cycles + OIDN": "#999999", "EEVEE": "#F0E442"}  # fmt: skip
+COLORS = {
+    "RSM": "#0072B2",
+    "LPV": "#009E73",
+    "VCT": "#D55E00",
+    "SSDO": "#CC79A7",
+    "HYBRID": "#E69F00",
+    "AUTO": "#56B4E9",
+    "Cycles": "#555555",
+    "Cycles + OIDN": "#999999",
+    "EEVEE": "#F0E442",
+}
 
-_CSS = """
-:root { color-scheme: light; --line: #d8d8d8; --soft: #f5f5f3; --ink: #1d1d1b; --quiet: #666; }
-* { box-sizing: border-box; }
-body { font: 15px/1.5 system-ui, sans-serif; color: var(--ink); background: #fff; margin: 0 auto; max-width: 1240px; padding: 24px; }
-h1 { font-size: 26px; margin: 0 0 4px; } h2 { margin: 40px 0 8px; border-bottom: 1px solid var(--line); } h3 { margin: 24px 0 6px; }
-p.lead, .quiet { color: var(--quiet); } code { background: var(--soft); padding: 0 4px; border-radius: 3px; }
-table { border-collapse: collapse; margin: 8px 0 16px; font-variant-numeric: tabular-nums; font-size: 13.5px; }
-th, td { padding: 3px 9px; border-bottom: 1px solid var(--line); text-align: right; vertical-align: top; }
-th { background: var(--soft); position: sticky; top: 0; } td:first-child, th:first-child, td.text { text-align: left; }
-.scroll { overflow-x: auto; }
-.pass { color: #11703b; } .fail, .error { color: #b3261e; font-weight: 600; } .nature { color: #8a5a00; font-weight: 600; }
-.na, .reported { color: var(--quiet); }
-nav a { margin-right: 14px; } img { image-rendering: pixelated; max-width: 100%; }
-figure { display: inline-block; margin: 6px 12px 6px 0; } figcaption { color: var(--quiet); font-size: 12.5px; }
-select, input, button { font: inherit; }
-.wipe { position: relative; overflow: hidden; background: #000; touch-action: none; cursor: ew-resize; }
-.wipe img { width: 100%; display: block; } .wipe img.top { position: absolute; inset: 0; clip-path: inset(0 calc(100% - var(--x, 50%)) 0 0); }
-.wipe .bar { position: absolute; top: 0; bottom: 0; left: var(--x, 50%); width: 2px; background: #fff; box-shadow: 0 0 3px #000; pointer-events: none; }
-.wipe .tag { position: absolute; bottom: 6px; padding: 1px 7px; color: #fff; background: #000a; font-size: 12px; pointer-events: none; }
-.wipe .tag.l { left: 6px; } .wipe .tag.r { right: 6px; }
-.cols { display: grid; grid-template-columns: 1fr 1fr; gap: 16px; } @media (max-width: 800px) { .cols { grid-template-columns: 1fr; } }
-"""
+_HERE = Path(__file__).parent
 
 
 def esc(text: Any) -> str:
@@ -83,6 +72,7 @@ def dump(value: Any) -> str:
 
 def table(head: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
     """An HTML table; cells are text, or ready HTML where they start with ``<``."""
+
     def cell(value: Any) -> str:
         text = number(value) if value is None or isinstance(value, float) else str(value)
         inner = text if text.startswith("<") else esc(text)
@@ -116,10 +106,22 @@ def picture(uri: str, caption: str, width: int | None = None) -> str:
 
 
 # Anchors of the magma colour map (S. van der Walt and N. Smith, CC0), evenly spaced; linear between them.
-_MAGMA = np.array([
-    (0, 0, 4), (20, 14, 54), (59, 15, 112), (100, 26, 128), (140, 41, 129), (183, 55, 121), (222, 73, 104), (247, 112, 92),
-    (254, 159, 109), (254, 207, 146), (252, 253, 191),
-], float)  # fmt: skip
+_MAGMA = np.array(
+    [
+        (0, 0, 4),
+        (20, 14, 54),
+        (59, 15, 112),
+        (100, 26, 128),
+        (140, 41, 129),
+        (183, 55, 121),
+        (222, 73, 104),
+        (247, 112, 92),
+        (254, 159, 109),
+        (254, 207, 146),
+        (252, 253, 191),
+    ],
+    float,
+)
 
 
 def heat(values: np.ndarray, low: float, high: float) -> np.ndarray:
@@ -153,7 +155,8 @@ def chart(figure: Any, name: str) -> str:
 def document(title: str, body: str, *, charts: bool, scripts: str = "") -> str:
     """A whole page."""
     source = f"<script>{plotly_source()}</script>" if charts else ""
+    css = (_HERE / "page.css").read_text()
     return (
         f'<!doctype html><html lang=en><head><meta charset=utf-8><meta name=viewport content="width=device-width">'
-        f"<title>{esc(title)}</title><style>{_CSS}</style>{source}</head><body>{body}<script>{scripts}</script></body></html>"
+        f"<title>{esc(title)}</title><style>{css}</style>{source}</head><body>{body}<script>{scripts}</script></body></html>"
     )

@@ -10,9 +10,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 EFFECTS = {
-    "indirect_diffuse": "Indirect diffuse", "glossy": "Glossy reflections", "shadows": "Shadows", "ao": "Ambient occlusion",
-    "translucency": "SSS and translucency", "volumetric": "Volumetric lighting", "area_lights": "Area lights",
-}  # fmt: skip
+    "indirect_diffuse": "Indirect diffuse",
+    "glossy": "Glossy reflections",
+    "shadows": "Shadows",
+    "ao": "Ambient occlusion",
+    "translucency": "SSS and translucency",
+    "volumetric": "Volumetric lighting",
+    "area_lights": "Area lights",
+}
 
 YES, PARTIALLY, NO = "Yes", "Partially", "No"
 TABLE_1: dict[str, dict[str, str]] = {
@@ -53,16 +58,27 @@ def _rows() -> tuple[Row, ...]:
         rows.append(Row(technique, label, packed, HD, hd, doubtful))
         rows.append(Row(technique, label, packed, FULL_HD, full_hd))
 
-    for resolution, rates in ((512, ((226, 122), (187, 99), (157, 84), (136, 73))), (1024, ((190, 109), (144, 84), (116, 68), (96, 58)))):
+    for resolution, rates in (
+        (512, ((226, 122), (187, 99), (157, 84), (136, 73))),
+        (1024, ((190, 109), (144, 84), (116, 68), (96, 58))),
+    ):
         for samples, (hd, full_hd) in zip((100, 200, 300, 400), rates, strict=True):
             add("RSM", f"{resolution}², {samples} samples", {"rsm.resolution": resolution, "rsm.samples": samples}, hd, full_hd)
     for resolution, (hd, full_hd) in ((32, (196, 111)), (64, (94, 68))):
         add("LPV", f"{resolution}³", {"lpv.resolution": resolution}, hd, full_hd)
-    for continuous, rates in ((False, ((283, 145), (250, 128), (230, 109), (178, 89))), (True, ((214, 138), (214, 121), (170, 96), (74, 52)))):
+    for continuous, rates in (
+        (False, ((283, 145), (250, 128), (230, 109), (178, 89))),
+        (True, ((214, 138), (214, 121), (170, 96), (74, 52))),
+    ):
         for resolution, (hd, full_hd) in zip((64, 128, 256, 512), rates, strict=True):
-            add("VCT", f"{resolution}³, continuous {'on' if continuous else 'off'}",
-                {"vct.resolution": resolution, "vct.continuous_voxelization": continuous}, hd, full_hd,
-                doubtful=continuous and resolution == 64)  # fmt: skip
+            add(
+                "VCT",
+                f"{resolution}³, continuous {'on' if continuous else 'off'}",
+                {"vct.resolution": resolution, "vct.continuous_voxelization": continuous},
+                hd,
+                full_hd,
+                doubtful=continuous and resolution == 64,
+            )
     for samples, (hd, full_hd) in zip((100, 200, 300, 400), ((85, 36), (50, None), (35, None), (27, None)), strict=True):
         add("SSDO", f"{samples} samples", {"ssdo.samples": samples}, hd, full_hd)
     return tuple(sorted(rows, key=lambda r: ("RSM", "LPV", "VCT", "SSDO").index(r.technique)))

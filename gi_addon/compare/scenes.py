@@ -364,6 +364,69 @@ def corridor(*, power: float = 60.0) -> Scene:
     return b.build(perspective((0.55, -2.8, 1.2), (-0.15, 0.0, 0.8), 1.1))
 
 
+def fog(density: float, color: Sequence[float] = (0.0, 0.0, 0.0)) -> World:
+    """A world filled with a medium of ``density`` per metre that scatters alike in all directions."""
+    nodes = (
+        Node("BACKGROUND", "Background", {"Color": tuple(color), "Strength": 1.0}),
+        Node("VOLUME_SCATTER", "Fog", {"Color": (1.0, 1.0, 1.0), "Density": float(density), "Anisotropy": 0.0}),
+    )
+    return World(ShaderGraph(nodes, Link(0, "Background"), Link(1, "Volume")))
+
+
+def effect(name: str) -> Scene:
+    """A scene made for one effect of the paper's Table 1, in which little else happens."""
+    b = SceneBuilder(f"effect-{name}")
+    white, red = diffuse(WHITE, "White"), diffuse(RED, "Red")
+    floor = np.array([[[-3, -3, 0], [3, -3, 0], [3, 3, 0], [-3, 3, 0]]])
+    back = np.array([[[-3, 2, 0], [-3, 2, 4], [3, 2, 4], [3, 2, 0]]])[:, ::-1]
+    tall = _turned(box_quads((-1.1, -0.3, 0), (-0.4, 0.4, 1.3)), 20, (-0.75, 0, 0))
+    blocks = (tall, box_quads((0.4, -0.6, 0), (1.2, 0.2, 0.6)))
+    camera = perspective((0, -5.0, 2.2), (0, 0.2, 0.6), 0.75)
+    if name == "indirect_diffuse":
+        return cornell()
+    if name == "glossy":
+        b.quads(floor, principled("Polished", Base_Color=(0.6, 0.6, 0.6, 1.0), Metallic=1.0, Roughness=0.15))
+        b.quads(back, red)
+        for quads in blocks:
+            b.quads(quads, white)
+        b.light(spot_light((-2.0, -3.0, 4.0), (0, 0, 0.5), 800.0, size=1.0))
+        return b.build(camera)
+    if name in ("shadows", "ao"):
+        b.quads(floor, white)
+        for quads in blocks:
+            b.quads(quads, white)
+        if name == "shadows":
+            b.light(spot_light((-2.0, -2.0, 4.0), (0, 0, 0), 800.0, size=1.2, radius=0.15))
+            return b.build(camera)
+        return b.build(camera, world((0.5, 0.5, 0.5), ao_distance=2.0))
+    if name == "translucency":
+        b.quads(floor, white)
+        matrix = np.eye(4)
+        matrix[:3, 3] = (-0.8, 0, 0.6)
+        wax = principled("Wax", Base_Color=(0.8, 0.6, 0.4, 1.0), Subsurface_Weight=1.0, Subsurface_Radius=(0.5, 0.25, 0.12),
+                         Roughness=1.0)  # fmt: skip
+        b.add(sphere(0.6, 48, 24), wax, matrix)
+        paper = Material("Paper", ShaderGraph((Node("BSDF_TRANSLUCENT", "Paper", {"Color": (0.8, 0.75, 0.6)}),), Link(0, "BSDF")))
+        b.quads(np.array([[[0.3, 0, 0], [1.5, 0, 0], [1.5, 0, 1.4], [0.3, 0, 1.4]]]), paper)
+        b.light(spot_light((0.5, 2.5, 2.5), (0, 0, 0.5), 600.0, size=1.0, radius=0.05))
+        return b.build(camera)
+    if name == "volumetric":
+        b.quads(floor, white)
+        for quads in blocks:
+            b.quads(quads, white)
+        b.light(spot_light((-2.0, 1.0, 3.5), (0.3, 0, 0.3), 1500.0, size=0.9, blend=0.3))
+        return b.build(camera, fog(0.08))
+    if name == "area_lights":
+        b.quads(floor, white)
+        b.quads(back, red)
+        for quads in blocks:
+            b.quads(quads, white)
+        panel = np.array([[[-2.4, -1.0, 3.2], [-2.4, 1.0, 3.2], [-1.0, 1.0, 3.8], [-1.0, -1.0, 3.8]]])
+        b.quads(panel, emissive((1.0, 0.9, 0.7), 20.0, "Panel"))
+        return b.build(camera)
+    raise KeyError(name)
+
+
 def transformed(scene: Scene, matrix: np.ndarray) -> Scene:
     """``scene`` moved, turned and scaled (uniformly) by ``matrix`` (4, 4), in place. Power goes with the square of the
     scale, so that radiance stays; sun strength is that of a surface already."""
@@ -394,6 +457,18 @@ def transformed(scene: Scene, matrix: np.ndarray) -> Scene:
                                aperture=camera.aperture * scale, focus=camera.focus * scale)  # fmt: skip
     scene.world.ao_distance *= scale
     return scene
+
+
+# Scenes by name, for ``quartet compare builtin:NAME``.
+BUILTIN = {
+    "cornell": cornell, "cornell-empty": lambda: cornell(blocks=False), "cornell-area": lambda: cornell(light="area"),
+    "cornell-point": lambda: cornell(light="point"), "corridor": corridor, "corner": corner, "furnace": furnace,
+    "integrating-sphere": integrating_sphere, "sliding-plate": sliding_plate, "thin-wall": lambda: thin_wall(0.1),
+    "two-patches": two_patches,
+    **{f"effect-{name}": (lambda name=name: effect(name)) for name in (
+        "indirect_diffuse", "glossy", "shadows", "ao", "translucency", "volumetric", "area_lights",
+    )},
+}  # fmt: skip
 
 
 __all__ = [name for name in globals() if not name.startswith("_") and name not in ("annotations", "CAMERA", "np")]

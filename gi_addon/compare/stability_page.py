@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from .page import chart, data_uri, document, esc, number, picture, table
-from .stability import ERROR, FAIL, NATURE, NOT_APPLICABLE, PASS, REPORTED, TESTS, Curve, Finding
+from .stability import ERROR, FAIL, KNOWN, NATURE, NOT_APPLICABLE, PASS, REPORTED, TESTS, Curve, Finding
 
 _CLASS = {PASS: "pass", FAIL: "fail", NATURE: "nature", NOT_APPLICABLE: "na", REPORTED: "reported", ERROR: "error"}
 
@@ -14,10 +14,13 @@ def _figure(curve: Curve):
 
     figure = go.Figure([go.Scatter(x=curve.x, y=y, name=name, mode="lines+markers") for name, y in curve.lines.items()])
     figure.update_layout(
-        template="simple_white", height=280, margin={"l": 60, "r": 20, "t": 36, "b": 44}, title={"text": curve.title, "font": {"size": 14}},
+        template="simple_white",
+        height=280,
+        margin={"l": 60, "r": 20, "t": 36, "b": 44},
+        title={"text": curve.title, "font": {"size": 14}},
         xaxis={"title": curve.x_title, "type": "log" if curve.log_x else "linear"},
         yaxis={"title": curve.y_title, "type": "log" if curve.log_y else "linear"},
-    )  # fmt: skip
+    )
     return figure
 
 
@@ -33,17 +36,21 @@ def page(results: dict[str, dict[str, Finding]], data: dict) -> str:
     summary = ", ".join(f"{n} {v}" for v, n in count.items() if n)
     parts = [
         "<h1>Where methods fail: the stability suite</h1>",
-        f"<p class=lead>Quartet {esc(data['version'])} on {esc(data['driver'])}; {'full' if data['full'] else 'quick'} sweep. {summary}.</p>",
+        f"<p class=lead>Quartet {esc(data['version'])} on {esc(data['driver'])}; "
+        f"{'full' if data['full'] else 'quick'} sweep. {summary}.</p>",
         "<h2>Verdicts</h2>",
         table(
             ["test", "what is measured", *techniques],
             [
-                [f'<a href="#t{k}">{k} {esc(TESTS[k].title)}</a>', f"<td class=text>{esc(TESTS[k].formula)}</td>",
-                 *(_badge(results[t][k]) if k in results[t] else "" for t in techniques)]
+                [
+                    f'<a href="#t{k}">{k} {esc(TESTS[k].title)}</a>',
+                    f"<td class=text>{esc(TESTS[k].formula)}</td>",
+                    *(_badge(results[t][k]) if k in results[t] else "" for t in techniques),
+                ]
                 for k in keys
             ],
         ),
-    ]  # fmt: skip
+    ]
     for key in keys:
         parts.append(f'<h2 id="t{key}">{key} · {esc(TESTS[key].title)}</h2><p class=quiet>{esc(TESTS[key].formula)}</p>')
         for technique in techniques:
@@ -51,15 +58,31 @@ def page(results: dict[str, dict[str, Finding]], data: dict) -> str:
             if finding is None:
                 continue
             parts.append(f"<h3>{technique}: {_badge(finding)}</h3>")
-            notes = [f"Why it cannot pass: {finding.nature}." if finding.verdict == NATURE else "", finding.note]
+            notes = [
+                f"Why it cannot pass: {finding.nature}." if finding.verdict == NATURE else "",
+                finding.note,
+                f"Known: {KNOWN[technique, key]}." if finding.verdict == FAIL and (technique, key) in KNOWN else "",
+            ]
             parts.append("".join(f"<p class=quiet>{esc(n)}</p>" for n in notes if n))
             if finding.quantities:
-                parts.append(table(
-                    ["quantity", "value", "limit", ""],
-                    [[q.name, number(q.value, 4), q.limit,
-                      "" if not q.limited else "<span class=pass>holds</span>" if q.holds else "<span class=fail>misses</span>"]
-                     for q in finding.quantities],
-                ))  # fmt: skip
+                parts.append(
+                    table(
+                        ["quantity", "value", "limit", ""],
+                        [
+                            [
+                                q.name,
+                                number(q.value, 4),
+                                q.limit,
+                                ""
+                                if not q.limited
+                                else "<span class=pass>holds</span>"
+                                if q.holds
+                                else "<span class=fail>misses</span>",
+                            ]
+                            for q in finding.quantities
+                        ],
+                    )
+                )
             if finding.curves:
                 parts.append("<div class=cols>")
                 parts += [f"<div>{chart(_figure(c), f'c-{technique}-{key}-{i}')}</div>" for i, c in enumerate(finding.curves)]

@@ -29,6 +29,8 @@ def settings_for(technique: str, **values: Any) -> Settings:
 
 def has_setting(path: str) -> bool:
     """Whether there is a setting of that dotted name."""
+    if not path:
+        return False
     try:
         Settings().get(path)
     except SettingError:
@@ -58,9 +60,7 @@ class Studio:
 
     def render(self, scene: Scene, settings: Settings, outputs, resolution: tuple[int, int], **options) -> Result:
         """One frame; see ``Renderer.render``."""
-        return self.call(
-            lambda gl: self.renderer.render(scene, settings, tuple(outputs), resolution=resolution, **options)
-        )
+        return self.call(lambda gl: self.renderer.render(scene, settings, tuple(outputs), resolution=resolution, **options))
 
     def textures(self) -> dict[str, np.ndarray]:
         """Every floating-point texture of the last frame's graph, flat; level 0 only."""

@@ -21,6 +21,7 @@ from ..passes.occupancy import CELL_UNIFORMS, Occupancy, set_cells
 from ..passes.resolve import Resolve
 from ..passes.surface_points import SETS, SurfacePoints, points_per_subframe
 from ..passes.volumetric import MEDIUM_UNIFORMS, Volumetric, medium_defines, set_medium
+from ..passes.world_guide import WorldGuide
 from ..settings import Settings
 
 
@@ -28,11 +29,12 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
     """Figure 4a, in order."""
     return [
         BRDFTables(),
+        Occupancy(),
+        WorldGuide(),
         LightList(),
         ShadowMaps(),
         RSMGeneration(),
         RSMFlux(),
-        Occupancy(),
         SurfacePoints(),
         RSMSamplingPattern(settings),
         GBuffer(),
@@ -256,7 +258,8 @@ class IndirectLighting(Pass):
 
 _RAY_READS = (
     "occupancy", "rsm.depth", "rsm.normal", "rsm.albedo", "rsm.lights", "rsm.views", "gbuffer.depth", "gbuffer.normal",
-    Optional("vpls"), Optional("gbuffer.emission", ("transmission.indirect",)), Optional("gbuffer.diffuse"), Optional("direct.diffuse"), Optional("indirect.diffuse"),
+    Optional("vpls"), Optional("gbuffer.emission", ("transmission.indirect",)), Optional("gbuffer.diffuse"),
+    Optional("direct.diffuse"), Optional("indirect.diffuse"),
 )  # fmt: skip
 _RAY_UNIFORMS = (
     *CELL_UNIFORMS,

@@ -72,7 +72,7 @@ def render_passes(scene: bpy.types.Scene, names: Iterable[str]) -> dict[str, np.
         if hasattr(image, "media_type"):
             image.media_type = "MULTI_LAYER_IMAGE"
         image.file_format = "OPEN_EXR_MULTILAYER"
-        image.color_depth = "32"
+        image.color_depth, image.exr_codec = "32", "ZIP"
         scene.render.use_overwrite = True
         scene.render.use_file_extension = True
         scene.render.filepath = str(Path(folder) / "passes")
@@ -91,7 +91,7 @@ def _restored(scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> Iterator[No
     render, image = scene.render, scene.render.image_settings
     saved = [(render, "filepath"), (render, "use_overwrite"), (render, "use_file_extension"),
              (render, "use_compositing"), (render, "use_sequencer"), (image, "media_type"), (image, "file_format"),
-             (image, "color_depth")]  # fmt: skip
+             (image, "color_depth"), (image, "exr_codec")]  # fmt: skip
     saved += [(layer, o.flag) for o in OUTPUTS.values() if "." not in o.flag]
     values = [(owner, name, getattr(owner, name)) for owner, name in saved if hasattr(owner, name)]
     try:

@@ -20,12 +20,16 @@ from ..outputs import LONG_NAMES, OUTPUTS
 from ..renderer import Renderer, RenderError
 from ..scene import Scene
 from ..settings import SettingError, Settings
-from . import properties
+from . import properties, status
 from .compat import pass_name
-from .sync import SceneSync
+from .sync import SceneSync, share_meshes
 from .viewport import Viewport, close_all
 
 _POLL_SECONDS = 0.05
+# How long a cancelled render waits for its sub-frame to end, in seconds.
+_PATIENCE = 0.5
+# Sub-frames of a material's or a light's thumbnail: it is shown at 32 to 256 pixels.
+_PREVIEW_SAMPLES = 8
 # Told of every render's progress (0 … 1, text) and of its notes: the command line shows them.
 listeners: list = []
 
@@ -42,6 +46,9 @@ class Job:
     layer: str
     film_transparent: bool
     persistent: bool
+    motion: tuple[Scene, ...] = ()
+    preview: bool = False
+    timed: bool = False
 
 
 class QuartetEngine(bpy.types.RenderEngine):
@@ -91,10 +98,37 @@ class QuartetEngine(bpy.types.RenderEngine):
         plain = self._sync.read(depsgraph, resolution=resolution, keep=persistent)
         layer = depsgraph.view_layer
         wanted = ("Combined", *(o.name for o in OUTPUTS.values() if o.name != "Combined" and pass_enabled(layer, o)))
+        settings = properties.read(scene)
+        if self.is_preview:
+            settings.samples = _PREVIEW_SAMPLES
+        motion = self._read_motion(depsgraph, resolution, min(settings.motion_steps, settings.samples))
+        measure = not self.is_preview and any(wm.quartet.measure for wm in bpy.data.window_managers)
         return Job(
-            plain, properties.read(scene), wanted, resolution, region, layer.name, bool(render.film_transparent),
-            persistent,
+            plain, settings, wanted, resolution, region, layer.name, bool(render.film_transparent), persistent, motion,
+            preview=self.is_preview, timed=measure,
         )  # fmt: skip
+
+    def _read_motion(self, depsgraph, resolution: tuple[int, int], steps: int) -> tuple[Scene, ...]:
+        """The scene at ``steps`` times while the shutter is open, in order; nothing without motion blur. Meshes that are
+        the same at all times are one object."""
+        scene = depsgraph.scene
+        if not scene.render.use_motion_blur or steps < 2:
+            return ()
+        shutter = scene.render.motion_blur_shutter
+        start = {"START": 0.0, "CENTER": -0.5, "END": -1.0}[scene.render.motion_blur_position] * shutter
+        frame, sub = scene.frame_current, scene.frame_subframe
+        states: list[Scene] = []
+        try:
+            for k in range(steps):
+                time = frame + sub + start + shutter * (k + 0.5) / steps
+                whole = int(np.floor(time))
+                self.frame_set(whole, time - whole)
+                state = self._sync.read(depsgraph, resolution=resolution)
+                share_meshes(state, states[-1] if states else None)
+                states.append(state)
+        finally:
+            self.frame_set(frame, sub)
+        return tuple(states)
 
     def render(self, depsgraph) -> None:
         """Render the job and write the result. Never raises: Blender would show a black picture and call it done."""
@@ -115,6 +149,7 @@ class QuartetEngine(bpy.types.RenderEngine):
                 self._free()
 
     def _fail(self, message: str) -> None:
+        status.failed(message)
         self.error_set(f"Quartet: {message}")
         self.report({"ERROR"}, f"Quartet: {message}")
 
@@ -128,10 +163,16 @@ class QuartetEngine(bpy.types.RenderEngine):
         def work(gl):
             if self._renderer is None:
                 self._renderer = Renderer(gl)
-            return self._renderer.render(
+            renderer = self._renderer
+            result = renderer.render(
                 job.scene, job.settings, job.outputs, resolution=job.resolution, region=job.region,
-                film_transparent=job.film_transparent, progress=progress, cancel=cancel,
+                film_transparent=job.film_transparent, progress=progress, cancel=cancel, timed=job.timed,
+                motion=job.motion,
             )  # fmt: skip
+            if not job.preview:
+                report = status.summarise("final", renderer, result.plan, job.scene, result.subframes, result.seconds)
+                status.publish(report)
+            return result
 
         self.update_stats("", "Quartet: preparing")
         future = shared().submit(work, cancel=cancel)
@@ -146,6 +187,10 @@ class QuartetEngine(bpy.types.RenderEngine):
                 break
             if self.test_break():
                 cancel.cancel()
+                # A sub-frame that takes long ends by itself on the GL thread; nobody has to watch it.
+                concurrent.futures.wait([future], timeout=_PATIENCE)
+                if not future.done():
+                    raise Cancelled
         result = future.result()
         for note in result.notes:
             self.report({"INFO"}, f"Quartet: {note}")
@@ -171,8 +216,8 @@ class QuartetEngine(bpy.types.RenderEngine):
         """Give GPU memory back."""
         renderer, self._renderer, self._sync = self._renderer, None, None
         if renderer is not None:
-            with contextlib.suppress(GLError):  # the context is gone, and the memory with it
-                shared().call(lambda gl: renderer.close())
+            # Not waited for: a cancelled sub-frame may still be in the making.
+            shared().submit(_close, renderer)
 
     # -- viewport ------------------------------------------------------------------------------------------------
 
@@ -204,6 +249,11 @@ class QuartetEngine(bpy.types.RenderEngine):
                 )
 
 
+def _close(gl, renderer: Renderer) -> None:
+    with contextlib.suppress(GLError):  # the context is gone, and the memory with it
+        renderer.close()
+
+
 def pass_enabled(layer: bpy.types.ViewLayer, output) -> bool:
     """Whether the view layer asks for a pass."""
     owner, _, flag = output.flag.rpartition(".")
@@ -222,25 +272,34 @@ def picture(render: bpy.types.RenderSettings) -> tuple[tuple[int, int], tuple[in
     return (width, height), (x0, y0, max(0, x1 - x0), max(0, y1 - y0))
 
 
-# Panels of Blender's own that make sense for this engine: those that any engine may use, and EEVEE's and Cycles'
-# common ones by their names.
+# Panels of Blender's own that any engine may use but that say nothing here …
 _NOT_OURS = {
     "VIEWLAYER_PT_filter", "VIEWLAYER_PT_layer_passes", "RENDER_PT_eevee", "RENDER_PT_simplify_greasepencil",
+    "DATA_PT_light", "NODE_DATA_PT_light",
+}  # fmt: skip
+# … and EEVEE's that hold what Quartet reads too. Their names have been the same since 4.5.
+_BORROWED = {
+    "DATA_PT_EEVEE_light", "NODE_DATA_PT_EEVEE_light", "DATA_PT_camera_dof", "DATA_PT_camera_dof_aperture",
+    "EEVEE_MATERIAL_PT_context_material", "EEVEE_MATERIAL_PT_surface", "EEVEE_MATERIAL_PT_volume", "MATERIAL_PT_preview",
+    "EEVEE_WORLD_PT_surface", "EEVEE_WORLD_PT_volume",
 }  # fmt: skip
 
 
-def _panels() -> list[type]:
+def standard_panels() -> list[type]:
+    """Blender's own panels that work for this engine."""
     out = []
     for panel in bpy.types.Panel.__subclasses__():
         engines = getattr(panel, "COMPAT_ENGINES", None)
-        if engines and "BLENDER_RENDER" in engines and panel.__name__ not in _NOT_OURS:
+        if engines and (
+            ("BLENDER_RENDER" in engines and panel.__name__ not in _NOT_OURS) or panel.__name__ in _BORROWED
+        ):
             out.append(panel)
     return out
 
 
 def register() -> None:
     bpy.utils.register_class(QuartetEngine)
-    for panel in _panels():
+    for panel in standard_panels():
         panel.COMPAT_ENGINES.add("QUARTET")
 
 

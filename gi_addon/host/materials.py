@@ -11,7 +11,8 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ..scene import Image, Link, Material, Node, ShaderGraph, World
+from ..materials import sky
+from ..scene import Image, Light, Link, Material, Node, ShaderGraph, World
 from .compat import uses_nodes
 
 _SRGB = ("sRGB", "sRGB - Texture", "Filmic sRGB", "AgX Base sRGB")
@@ -20,7 +21,7 @@ _DATA = ("Non-Color", "Raw", "Generic Data", "Utility - Raw")
 # Settings of nodes that decide what they compute.
 _PARAMS: dict[str, tuple[str, ...]] = {
     "BSDF_PRINCIPLED": ("distribution", "subsurface_method"), "BSDF_GLOSSY": ("distribution",),
-    "BSDF_METALLIC": ("distribution", "fresnel_type"), "BSDF_GLASS": ("distribution",),
+    "BSDF_SHEEN": ("distribution",), "BSDF_METALLIC": ("distribution", "fresnel_type"), "BSDF_GLASS": ("distribution",),
     "MATH": ("operation", "use_clamp"), "VECT_MATH": ("operation",),
     "MIX": ("data_type", "blend_type", "factor_mode", "clamp_factor", "clamp_result"),
     "MIX_RGB": ("blend_type", "use_clamp"), "MAPPING": ("vector_type",), "SEPARATE_COLOR": ("mode",),
@@ -45,6 +46,9 @@ _ATLAS_LIMIT = 8192  # texels a side of all tiles of an image together
 _PCG = bpy.app.version >= (5, 0, 0)  # how this Blender hashes Voronoi cells
 
 
+_skies: dict[str, tuple] = {}  # settings -> (Sky, Image): computed once, half a second each
+
+
 class ImageTable:
     """The scene's images, each read once. ``notes`` gets a line for each that can't be read."""
 
@@ -63,6 +67,24 @@ class ImageTable:
             self._index[key] = len(self.images)
             self.images.append(self._read(image, key, owner))
         return self._index[key]
+
+    def sky(self, params: dict[str, Any]) -> dict[str, Any]:
+        """What a Sky Texture's settings come to: its image among :attr:`images`, and its sun's colours."""
+        key = repr(sorted(params.items()))
+        if key not in _skies:
+            found = sky.sky(params)
+            if len(_skies) > 8:
+                _skies.clear()
+            _skies[key] = (found, found and Image("Sky", found.pixels, "linear"))
+        found, image = _skies[key]
+        if found is None:
+            return {}
+        if image not in self.images:
+            self.images.append(image)
+        return {
+            "image": self.images.index(image), "sun_low": tuple(found.sun_low.tolist()),
+            "sun_high": tuple(found.sun_high.tolist()),
+        }  # fmt: skip
 
     def _read(self, image: bpy.types.Image, key: int, owner: str) -> Image:
         stamp = (image.filepath, tuple(image.size), image.colorspace_settings.name, image.is_dirty, image.source)
@@ -244,6 +266,8 @@ class GraphReader:
             if node.object is not None:
                 matrix = node.object.matrix_world.inverted_safe()
                 params["object_matrix"] = [tuple(float(v) for v in matrix[r]) for r in range(3)]
+        elif node.type == "TEX_SKY":
+            params |= self.images.sky(params)
         elif node.type == "TEX_VORONOI":
             params["pcg"] = _PCG
         elif node.type == "VALTORGB":
@@ -357,9 +381,32 @@ def read_material(material: bpy.types.Material, images: ImageTable) -> Material:
     return Material(material.name, graph, pass_index=material.pass_index)
 
 
+def read_light(data: bpy.types.Light, images: ImageTable) -> ShaderGraph:
+    """The graph of a light's nodes."""
+    graph = ShaderGraph()
+    for tree in _trees(data):
+        graph = GraphReader(images, f"light {data.name}").read(tree, "OUTPUT_LIGHT")
+    return graph
+
+
 def default_material() -> Material:
     """What Blender shows where a surface has no material: grey, diffuse."""
     return Material("No Material", ShaderGraph((Node("BSDF_DIFFUSE", "", {"Color": (0.8, 0.8, 0.8)}),), Link(0, "BSDF")))
+
+
+def holdout_material(material: Material) -> Material:
+    """The material as an object has it that is held out: a hole to the camera, itself to light."""
+    nodes = [*material.graph.nodes]
+    n = len(nodes)
+    nodes += [
+        Node("LIGHT_PATH"), Node("HOLDOUT"),
+        Node("MIX_SHADER", "", {
+            "Fac": Link(n, "Is Camera Ray"), "Shader": material.graph.surface, "Shader_001": Link(n + 1, "Holdout"),
+        }),
+    ]  # fmt: skip
+    if material.graph.surface is None:
+        del nodes[-1].inputs["Shader"]
+    return Material(f"{material.name} held out", ShaderGraph(tuple(nodes), Link(n + 2, "Shader"), material.graph.volume))
 
 
 def read_world(world: bpy.types.World | None, images: ImageTable) -> World:
@@ -373,5 +420,47 @@ def read_world(world: bpy.types.World | None, images: ImageTable) -> World:
     else:
         node = Node("BACKGROUND", world.name, {"Color": tuple(world.color), "Strength": 1.0})
         graph = ShaderGraph((node,), Link(0, "Background"))
+    graph = _sun_apart(graph)
     visible = getattr(getattr(world, "cycles_visibility", None), "camera", True)
     return World(graph, world.light_settings.distance, bool(visible))
+
+
+def _sky_background(graph: ShaderGraph) -> tuple[Node, int, float] | None:
+    """(sky node, its index, strength) where the world is one Sky Texture with a sun at a constant strength."""
+    if graph.surface is None:
+        return None
+    background = graph.nodes[graph.surface.node]
+    color, strength = background.inputs.get("Color"), background.inputs.get("Strength", 1.0)
+    if background.kind != "BACKGROUND" or not isinstance(color, Link) or isinstance(strength, Link):
+        return None
+    node = graph.nodes[color.node]
+    scattered = node.params.get("sky_type") not in ("PREETHAM", "HOSEK_WILKIE")  # they have no disc
+    if node.kind != "TEX_SKY" or not scattered or not node.params.get("sun_disc") or "sun_high" not in node.params:
+        return None
+    return None if isinstance(node.inputs.get("Vector"), Link) else (node, color.node, float(strength))
+
+
+def _sun_apart(graph: ShaderGraph) -> ShaderGraph:
+    """Mark a sky's sun as a light of its own: half a degree is too small for a map of the whole sky."""
+    found = _sky_background(graph)
+    if found is None:
+        return graph
+    node, index, _ = found
+    marked = Node(node.kind, node.name, node.inputs, node.params | {"sun_light": True})
+    return ShaderGraph((*graph.nodes[:index], marked, *graph.nodes[index + 1 :]), graph.surface, graph.volume)
+
+
+def world_sun(graph: ShaderGraph) -> Light | None:
+    """The sun of a world that is a Sky Texture."""
+    found = _sky_background(graph)
+    if found is None:
+        return None
+    node, _, strength = found
+    z = sky.sun_direction(node.params)
+    x = np.cross([0.0, 1.0, 0.0] if abs(z[1]) < 0.9 else [1.0, 0.0, 0.0], z)
+    x /= np.linalg.norm(x)
+    matrix = np.eye(4)
+    matrix[:3, 0], matrix[:3, 1], matrix[:3, 2] = x, np.cross(z, x), z
+    ends = sky.Sky(np.zeros((0, 0, 4)), np.array(node.params["sun_low"]), np.array(node.params["sun_high"]))
+    size = float(node.params.get("sun_size", 0.0))
+    return Light("Sky's sun", "SUN", strength * sky.sun_irradiance(ends, node.params), matrix, angle=size, visible_camera=False)

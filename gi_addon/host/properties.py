@@ -12,12 +12,21 @@ from ..settings import Meta, Settings, meta_of, walk
 _classes: list[type] = []
 
 
+def _redraw(_settings, _context) -> None:
+    """Have the viewports drawn again: Blender does not know that they depend on these."""
+    for window_manager in bpy.data.window_managers:
+        for window in window_manager.windows:
+            for area in window.screen.areas:
+                if area.type == "VIEW_3D":
+                    area.tag_redraw()
+
+
 def _property(default, meta: Meta):
-    text = meta.text
+    common = {"name": meta.label, "description": meta.text, "default": default, "update": _redraw}
     if meta.choices:
-        return bpy.props.EnumProperty(name=meta.label, description=text, items=list(meta.choices), default=default)
+        return bpy.props.EnumProperty(items=list(meta.choices), **common)
     if isinstance(default, bool):
-        return bpy.props.BoolProperty(name=meta.label, description=text, default=default)
+        return bpy.props.BoolProperty(**common)
     limits = {}
     if meta.low is not None:
         limits["min"] = meta.low
@@ -27,9 +36,9 @@ def _property(default, meta: Meta):
         limits["soft_max"] = meta.soft_high
     if isinstance(default, int):
         whole = {k: int(v) for k, v in limits.items()}
-        return bpy.props.IntProperty(name=meta.label, description=text, default=default, **whole)
+        return bpy.props.IntProperty(**common, **whole)
     kind = {"m": {"subtype": "DISTANCE", "unit": "LENGTH"}}.get(meta.unit, {})
-    return bpy.props.FloatProperty(name=meta.label, description=text, default=default, **limits, **kind)
+    return bpy.props.FloatProperty(**common, **limits, **kind)
 
 
 def _make(cls: type, name: str) -> type:
@@ -52,9 +61,35 @@ def _make(cls: type, name: str) -> type:
 _window_class: list[type] = []
 
 
+def _show(window, _context) -> None:
+    from . import comparison  # which reads settings through this module
+
+    comparison.show(window)
+
+
 def _make_window() -> type:
     """What this session of Blender shows; saved in no file and no part of the picture."""
+    from . import comparison
+
     annotations = {
+        "reference": bpy.props.EnumProperty(
+            name="Reference", default="Rinf",
+            items=[("R1", "One Bounce", "What the paper's techniques approximate"),
+                   ("Rinf", "All Bounces", "32 bounces: the truth")],
+        ),
+        "reference_samples": bpy.props.IntProperty(
+            name="Cycles Samples", default=64, min=1, max=65536, soft_max=1024,
+            description="Samples of each of two Cycles renders. Higher: less noise in the reference. Lower: sooner",
+        ),
+        "compare_percentage": bpy.props.IntProperty(
+            name="Size", default=50, min=1, max=100, subtype="PERCENTAGE",
+            description="Size of the compared pictures, as a share of the render size",
+        ),
+        "compare_pass": bpy.props.EnumProperty(
+            name="Pass", items=comparison.passes, update=_show, description="Pass of the comparison that is shown"
+        ),
+        "compare_view": bpy.props.EnumProperty(name="View", items=comparison.VIEWS, update=_show),
+        "cancel_compare": bpy.props.BoolProperty(name="Cancel", description="Give the comparison up"),
         "measure": bpy.props.BoolProperty(
             name="Measure Passes", default=False,
             description="Time every pass of the viewport. On software OpenGL this costs a little speed",

@@ -12,6 +12,8 @@ from dataclasses import dataclass
 
 from ..gl.context import MIB
 from ..graph import Plan
+from ..renderer import Renderer
+from ..scene import Scene
 
 _LOG_LINES = 200
 
@@ -40,6 +42,7 @@ class Report:
     skipped: tuple[tuple[str, str], ...]
     mib: float
     notes: tuple[str, ...] = ()
+    approximated: tuple[tuple[str, str], ...] = ()  # (material, what of it)
 
 
 # The last frame of each kind, ``viewport`` and ``final``; why there is no picture, if there is none.
@@ -48,11 +51,10 @@ problem: str = ""
 _log: deque[str] = deque(maxlen=_LOG_LINES)
 
 
-def summarise(
-    kind: str, plan: Plan, subframes: int, seconds: float, milliseconds: dict[str, list[float]], notes: list[str]
-) -> Report:
-    """A Report of a plan that ran; keeps nothing of the scene alive."""
+def summarise(kind: str, renderer: Renderer, plan: Plan, scene: Scene, subframes: int, seconds: float) -> Report:
+    """A Report of a plan that ``renderer`` ran, on the GL thread; it keeps nothing of the scene alive."""
     facts = plan.facts
+    milliseconds = renderer.timers.collect()
     rows = []
     for planned in plan.run:
         times = milliseconds.get(planned.title)
@@ -60,9 +62,13 @@ def summarise(
             planned.title, planned.task.rate(facts), planned.reason,
             sum(w.nbytes(facts) for w in planned.writes) / MIB, sum(times) / len(times) if times else None,
         ))  # fmt: skip
-    skipped = tuple((task.title, reason) for task, reason in plan.skipped)
-    return Report(kind, facts.settings.technique, facts.resolution, subframes, seconds, tuple(rows), skipped,
-                  plan.nbytes() / MIB, tuple(notes))  # fmt: skip
+    return Report(
+        kind, facts.settings.technique, facts.resolution, subframes, seconds, tuple(rows),
+        tuple((task.title, reason) for task, reason in plan.skipped), plan.nbytes() / MIB,
+        tuple(dict.fromkeys([*scene.notes, *facts.rig.notes])),
+        tuple((material.name, text) for material, compiled in zip(scene.materials, renderer.gpu.compiled, strict=True)
+              for text in compiled.approximated),
+    )  # fmt: skip
 
 
 def publish(report: Report) -> None:

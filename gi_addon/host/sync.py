@@ -13,6 +13,7 @@ from dataclasses import fields
 import bpy
 import numpy as np
 
+from ..materials import mean_emission
 from ..scene import (
     ALL_RAYS,
     CAMERA,
@@ -31,13 +32,18 @@ from ..scene import (
     Scene,
     World,
 )
+from . import strands
 from .compat import uses_nodes
-from .materials import ImageTable, default_material, read_material, read_world
+from .materials import ImageTable, default_material, holdout_material, read_light, read_material, read_world, world_sun
 
-_MESH_LIKE = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
+_MESH_LIKE = {"MESH", "CURVE", "SURFACE", "FONT", "META", "CURVES"}
 _RAYS = (("visible_camera", CAMERA), ("visible_diffuse", DIFFUSE), ("visible_glossy", GLOSSY),
          ("visible_transmission", TRANSMISSION), ("visible_volume_scatter", VOLUME),
          ("visible_shadow", SHADOW))  # fmt: skip
+
+
+# Nodes of lights whose mean is their value.
+_LIGHT_NUMBERS = {"EMISSION", "RGB", "VALUE", "BLACKBODY", "LIGHT_FALLOFF", "MATH", "ADD_SHADER", "MIX_SHADER", "MIX", "MIX_RGB"}
 
 
 class SceneSync:
@@ -50,6 +56,9 @@ class SceneSync:
         self._images: dict[int, tuple[tuple, Image]] = {}
         self._world: tuple[World, list[Image]] | None = None
         self._default = default_material()
+        self._ball: Mesh | None = None
+        self._hairs: dict[tuple, list[tuple[Mesh, int]]] = {}
+        self._holdouts: dict[int, tuple[Material, Material]] = {}
         self.counts: dict[str, int] = {}
 
     def forget(self) -> None:
@@ -67,16 +76,14 @@ class SceneSync:
                 if update.is_updated_geometry:
                     uid = data.original.session_uid
                     self._meshes = {k: v for k, v in self._meshes.items() if k[0] != uid}
-            elif isinstance(data, (bpy.types.Mesh, bpy.types.Curve, bpy.types.MetaBall)):
-                changed = True
-                if update.is_updated_geometry:
-                    self._meshes = {k: v for k, v in self._meshes.items() if k[1] != data.name_full}
-            elif isinstance(data, bpy.types.Image):
-                changed = True
+                    self._hairs = {k: v for k, v in self._hairs.items() if k[0] != uid}
+                continue
+            # Node trees are read again anyway and compared. A scene or collection may have lost or hidden objects.
+            changed = True
+            if isinstance(data, bpy.types.Image):
                 self._images.pop(data.original.session_uid, None)
-            else:
-                # Node trees are read again anyway and compared. A scene or collection may have lost or hidden objects.
-                changed = True
+            elif update.is_updated_geometry:  # a mesh, curve … that several objects may use
+                self._meshes = {k: v for k, v in self._meshes.items() if k[1] != data.name_full}
         return changed
 
     def read(
@@ -93,6 +100,7 @@ class SceneSync:
         3D view with a local view or collections of its own: only what it shows counts."""
         if not keep:
             self._meshes.clear()
+            self._hairs.clear()
             self._materials.clear()
             self._world = None
         self.counts = {"meshes": 0, "materials": 0}
@@ -111,14 +119,18 @@ class SceneSync:
             if space is not None and not _shown_in(instance, space):
                 continue
             if obj.type == "LIGHT":
-                light = _read_light(instance, obj, scene.notes)
+                light = _read_light(instance, obj, scene.notes, images)
                 if light is not None:
                     scene.lights.append(light)
                 continue
             if obj.type not in _MESH_LIKE:
-                if obj.type in ("CURVES", "POINTCLOUD", "VOLUME", "GREASEPENCIL"):
+                if obj.type == "POINTCLOUD":
+                    self._points(instance, obj, scene, materials, placed, depsgraph.view_layer)
+                elif obj.type in ("VOLUME", "GREASEPENCIL"):
                     _note(scene, f"{obj.type.capitalize()} objects are not rendered yet ({obj.name})")
                 continue
+            if obj.particle_systems and not instance.is_instance:
+                self._hair(obj, scene, materials, placed, depsgraph)
             matrix = np.array(instance.matrix_world, dtype="f8")
             if not np.isfinite(matrix).all():
                 _note(scene, f"object {obj.name} is left out: its transform is not a number")
@@ -127,12 +139,16 @@ class SceneSync:
             if index is None:
                 continue
             slots = [slot.material for slot in obj.material_slots] or list(getattr(obj.data, "materials", []))
-            visibility = _visibility(obj)
-            placed.add(index, matrix, tuple(materials.index(m) for m in slots) or (materials.index(None),),
+            visibility = _visibility(obj, depsgraph.view_layer)
+            held = bool(visibility & HOLDOUT)
+            placed.add(index, matrix, tuple(materials.index(m, held) for m in slots) or (materials.index(None, held),),
                        visibility, _random(instance, obj), obj.pass_index, tuple(obj.color))  # fmt: skip
         self._meshes = {k: v for k, v in self._meshes.items() if k in used_keys}
         scene.instances = placed.instances()
         scene.world = self._read_world(source, images)
+        sun = world_sun(scene.world.graph)
+        if sun is not None and (sun.emission > 0.0).any():
+            scene.lights.append(sun)
         scene.images = images.images
         scene.camera = camera or _read_camera(source, depsgraph, resolution, scene.notes)
         return scene
@@ -149,6 +165,43 @@ class SceneSync:
                 return old
         self._world = (world, used)
         return world
+
+    def _points(self, instance, obj, scene: Scene, materials, placed, layer) -> None:
+        """A point cloud: one ball, placed at every point."""
+        at, radii = strands.points_of(obj)
+        if not len(at):
+            return
+        if self._ball is None:
+            self._ball = strands.ball()
+        if self._ball not in scene.meshes:
+            scene.meshes.append(self._ball)
+        index = scene.meshes.index(self._ball)
+        slots = [slot.material for slot in obj.material_slots] or [None]
+        used, visibility = tuple(materials.index(m) for m in slots), _visibility(obj, layer)
+        world = np.array(instance.matrix_world, "f8")
+        for place, radius in zip(at, radii, strict=True):
+            matrix = np.eye(4)
+            matrix[:3, :3] *= radius
+            matrix[:3, 3] = place
+            placed.add(index, world @ matrix, used, visibility, _random(instance, obj), obj.pass_index, tuple(obj.color))
+
+    def _hair(self, obj, scene: Scene, materials, placed, depsgraph) -> None:
+        """The hair of an object's particle systems, each a mesh of its own in world space."""
+        key = (obj.original.session_uid, "", "HAIR")
+        found = self._hairs.get(key)
+        if found is None:
+            try:
+                found = strands.particle_meshes(obj, depsgraph.mode == "RENDER")
+            except RuntimeError as error:
+                _note(scene, f"the hair of {obj.name} is left out: {error}")
+                return
+            self._hairs[key] = found
+        for mesh, slot in found:
+            scene.meshes.append(mesh)
+            slots = [s.material for s in obj.material_slots] or [None]
+            material = materials.index(slots[min(slot, len(slots) - 1)])
+            placed.add(len(scene.meshes) - 1, np.eye(4), (material,), _visibility(obj, depsgraph.view_layer), 0.0,
+                       obj.pass_index, tuple(obj.color))  # fmt: skip
 
     # -- meshes --------------------------------------------------------------------------------------------------
 
@@ -190,14 +243,21 @@ class _MaterialIndex:
 
     def __init__(self, sync: SceneSync, images: ImageTable, scene: Scene) -> None:
         self.sync, self.images, self.scene = sync, images, scene
-        self._index: dict[int, int] = {}
+        self._index: dict[tuple[int, bool], int] = {}
 
-    def index(self, material: bpy.types.Material | None) -> int:
+    def index(self, material: bpy.types.Material | None, held: bool = False) -> int:
+        """Index of a material; ``held``: of its variant that the camera sees as a hole."""
         key = material.original.session_uid if material is not None else 0
-        if key not in self._index:
-            self._index[key] = len(self.scene.materials)
-            self.scene.materials.append(self._get(material, key))
-        return self._index[key]
+        if (key, held) not in self._index:
+            found = self._get(material, key)
+            if held:
+                old = self.sync._holdouts.get(key)
+                if old is None or old[0] is not found:
+                    old = self.sync._holdouts[key] = (found, holdout_material(found))
+                found = old[1]
+            self._index[key, held] = len(self.scene.materials)
+            self.scene.materials.append(found)
+        return self._index[key, held]
 
     def _get(self, material, key: int) -> Material:
         if material is None:
@@ -244,6 +304,25 @@ def _shown_in(instance, space: bpy.types.SpaceView3D) -> bool:
     return bool(obj.original.visible_in_viewport_get(space))
 
 
+def share_meshes(scene: Scene, before: Scene | None) -> None:
+    """Take over the meshes of ``before`` that look the same in ``scene``, which then are not sent to the GPU again."""
+    if before is None:
+        return
+    old = {mesh.name: mesh for mesh in before.meshes}
+    for i, mesh in enumerate(scene.meshes):
+        same = old.get(mesh.name)
+        if same is not None and _same_mesh(mesh, same):
+            scene.meshes[i] = same
+
+
+def _same_mesh(a: Mesh, b: Mesh) -> bool:
+    arrays = [(a.positions, b.positions), (a.triangles, b.triangles), (a.slots, b.slots), (a.normals, b.normals)]
+    if a.attributes.keys() != b.attributes.keys():
+        return False
+    arrays += [(a.attributes[k], b.attributes[k]) for k in a.attributes]
+    return all(x.shape == y.shape and np.array_equal(x, y) for x, y in arrays)
+
+
 def _note(scene: Scene, text: str) -> None:
     if text not in scene.notes:
         scene.notes.append(text)
@@ -273,9 +352,13 @@ def _lookup3(x: int, y: int) -> int:
     return v[2]
 
 
-def _visibility(obj: bpy.types.Object) -> int:
+def _visibility(obj: bpy.types.Object, layer: bpy.types.ViewLayer) -> int:
+    """Bits of the rays that see an object, by itself and by its collections in the view layer."""
     bits = sum(bit for name, bit in _RAYS if getattr(obj, name, True))
-    if obj.is_holdout:
+    original = obj.original
+    if original.indirect_only_get(view_layer=layer):
+        bits &= ~CAMERA
+    if obj.is_holdout or original.holdout_get(view_layer=layer):
         bits |= HOLDOUT
     return bits & (ALL_RAYS | HOLDOUT)
 
@@ -285,6 +368,8 @@ def _read_object_mesh(obj: bpy.types.Object, scene: Scene) -> Mesh | None:
     # In edit mode the evaluated mesh is still the editor's, without arrays: to_mesh() makes them.
     if obj.type == "MESH" and obj.mode != "EDIT":
         return read_mesh(obj.data, obj.name)
+    if obj.type == "CURVES":
+        return strands.curves_mesh(obj)
     try:
         mesh = obj.to_mesh()
     except RuntimeError as error:
@@ -435,21 +520,25 @@ def _by_material(mesh, triangles: np.ndarray, triangle_count: int) -> tuple[np.n
 # --- lights and cameras -----------------------------------------------------------------------------------------------
 
 
-def _read_light(instance, obj: bpy.types.Object, notes: list[str]) -> Light | None:
+def _read_light(instance, obj: bpy.types.Object, notes: list[str], images: ImageTable) -> Light | None:
     """A Light from Blender's, in Cycles' units."""
     data = obj.data
+    linking = getattr(obj, "light_linking", None)
+    if linking is not None and (linking.receiver_collection or linking.blocker_collection):
+        notes.append(f"light {obj.name} is linked to some objects; here it lights and is blocked by all")
     strength = float(data.energy) * 2.0 ** float(getattr(data, "exposure", 0.0))
     color = np.array(data.color, "f8")
     if getattr(data, "use_temperature", False):
         color = color * np.array(data.temperature_color, "f8")
     if uses_nodes(data):
-        color = color * _light_nodes(data, notes)
+        color = color * _light_nodes(data, notes, images)
     matrix = np.array(instance.matrix_world, "f8")
     scale = [float(np.linalg.norm(matrix[:3, k])) for k in range(3)]
     light = Light(
         obj.name, data.type, color * strength, matrix,
         use_shadow=bool(getattr(data, "use_shadow", True)) and bool(getattr(data.cycles, "cast_shadow", True)),
-        visible_camera=bool(obj.visible_camera),
+        visible_camera=bool(obj.visible_camera), visible_diffuse=bool(obj.visible_diffuse),
+        visible_glossy=bool(obj.visible_glossy),
     )  # fmt: skip
     if data.type in ("POINT", "SPOT"):
         light.radius = float(data.shadow_soft_size)
@@ -477,17 +566,13 @@ def _light_area(light: Light, scale: list[float]) -> float:
     return math.pi * light.radius**2 * 4.0 if light.radius > 0 else 1.0
 
 
-def _light_nodes(data: bpy.types.Light, notes: list[str]) -> np.ndarray:
-    """Colour × strength of an Emission node; anything else counts as 1 with a note."""
-    tree = data.node_tree
-    output = next((n for n in tree.nodes if n.type == "OUTPUT_LIGHT" and not n.mute), None)
-    if output is None or not output.inputs["Surface"].is_linked:
-        return np.zeros(3) if output is not None else np.ones(3)
-    node = output.inputs["Surface"].links[0].from_node
-    if node.type != "EMISSION" or node.inputs["Color"].is_linked or node.inputs["Strength"].is_linked:
-        notes.append(f"light {data.name}: its nodes are not evaluated, its colour and power alone count")
-        return np.ones(3)
-    return np.array(node.inputs["Color"].default_value[:3], "f8") * float(node.inputs["Strength"].default_value)
+def _light_nodes(data: bpy.types.Light, notes: list[str], images: ImageTable) -> np.ndarray:
+    """Colour × strength (3,) of a light's nodes, textures by their mean; a note where they are more than numbers."""
+    graph = read_light(data, images)
+    kinds = {node.kind for node in graph.nodes}
+    if kinds - _LIGHT_NUMBERS:
+        notes.append(f"light {data.name}: {', '.join(sorted(kinds - _LIGHT_NUMBERS))} count by their mean")
+    return mean_emission(graph, images.images)
 
 
 def _read_camera(
@@ -510,4 +595,25 @@ def _read_camera(
     if data.type == "PANO":
         notes.append(f"camera {obj.name} is panoramic, which a rasteriser has no projection for; it renders as its "
                      "perspective lens")  # fmt: skip
-    return Camera(matrix, np.array(projection, "f8"), float(data.clip_start), float(data.clip_end), name=obj.name)
+    result = Camera(matrix, np.array(projection, "f8"), float(data.clip_start), float(data.clip_end), name=obj.name)
+    if data.dof.use_dof:
+        _read_lens(result, obj, matrix)
+    return result
+
+
+def _read_lens(camera: Camera, obj: bpy.types.Object, matrix: np.ndarray) -> None:
+    """Depth of field as Cycles has it: the lens is focal length / f-number wide; for orthographic cameras a metre is that
+    length. A focus object counts by its depth along the view."""
+    data, dof = obj.data, obj.data.dof
+    length = 1.0 if data.type == "ORTHO" else 1e-3 * data.lens
+    camera.aperture = 0.5 * length / max(dof.aperture_fstop, 1e-5)
+    camera.focus = float(dof.focus_distance)
+    if dof.focus_object is not None:
+        target = dof.focus_object.matrix_world
+        if dof.focus_subtarget and dof.focus_object.pose and dof.focus_subtarget in dof.focus_object.pose.bones:
+            target = target @ dof.focus_object.pose.bones[dof.focus_subtarget].matrix
+        camera.focus = abs(float((np.array(target.translation) - matrix[:3, 3]) @ matrix[:3, 2]))
+    camera.focus = max(camera.focus, 1e-5)
+    camera.blades = int(dof.aperture_blades)
+    camera.blade_turn = float(dof.aperture_rotation)
+    camera.blade_ratio = max(float(dof.aperture_ratio), 1e-5)

@@ -21,7 +21,8 @@ import gpu
 import numpy as np
 from gpu_extras.presets import draw_texture_2d
 
-from ..gl import Cancelled, CancelToken, GLError, shared
+from ..gl import Cancelled, CancelToken, GLContextLost, GLError, shared
+from ..graph import Plan
 from ..renderer import Renderer, RenderError
 from ..scene import Camera, Scene
 from ..settings import SettingError, Settings
@@ -91,10 +92,12 @@ class Viewport:
         self._scale = _COARSEST
         self._first: float | None = None
         self._failed: tuple | None = None
+        self._lost = False
         self._picture: Picture | None = None
         self._texture: tuple[Picture, gpu.types.GPUTexture] | None = None
-        # Of the GL thread: the renderer, and the request and sub-frame that its film is ready for.
+        # Of the GL thread: the renderer, its plan, and the request and sub-frame that its film is ready for.
         self._renderer: Renderer | None = None
+        self._plan: Plan | None = None
         self._next: tuple | None = None
         # What there was to do, for the tests and the update matrix of the docs.
         self.counts = Counter()
@@ -131,7 +134,9 @@ class Viewport:
         _watch()
 
     def close(self) -> None:
-        """Stop, and give the GPU's memory back without waiting for it."""
+        """Stop, and give the GPU's memory back without waiting for it. Once: Blender may free the engine long after."""
+        if self not in _live:
+            return
         _live.discard(self)
         self._token.cancel()
         self._texture = self._picture = self._request = self._scene = None
@@ -226,7 +231,7 @@ class Viewport:
         renderer.timers.enabled = request.timed
         renderer.timers.reset()
         if first == 0:
-            renderer.begin(
+            self._plan = renderer.begin(
                 request.scene, request.settings, resolution=size, region=region, subframes=samples,
                 camera=request.camera, film_transparent=request.film_transparent,
             )  # fmt: skip
@@ -242,15 +247,14 @@ class Viewport:
         pixels = np.clip(renderer.film()["combined"], -_HALF_MAX, _HALF_MAX)
         gl.check("the viewport")
         report = status.summarise(
-            "viewport", renderer._plan, done, time.perf_counter() - start, renderer.timers.collect(),
-            [*request.scene.notes, *renderer.frame.facts.rig.notes],
-        )  # fmt: skip
+            "viewport", renderer, self._plan, request.scene, done, time.perf_counter() - start
+        )
         self._next = (request.key, request.scale, done)
         return Picture(request, done, np.ascontiguousarray(pixels, np.float32), first_seconds, report,
                        frozenset(renderer.gpu.uploads))  # fmt: skip
 
     def _close_renderer(self, gl) -> None:
-        renderer, self._renderer = self._renderer, None
+        renderer, self._renderer, self._plan = self._renderer, None, None
         if renderer is not None:
             with contextlib.suppress(GLError):
                 renderer.close()
@@ -267,6 +271,12 @@ class Viewport:
             picture = job.result()
         except Cancelled:
             return
+        except GLContextLost as error:
+            # The driver dropped it; the next job starts a new one. Once: a driver that keeps doing so needs its user.
+            if self._lost:
+                self._fail(str(error), self._request.key if self._request else None)
+            self._lost = not self._lost
+            return
         except Exception as error:
             text = str(error) if isinstance(error, (RenderError, GLError)) else f"{type(error).__name__}: {error}"
             self._fail(text, self._request.key if self._request else None)
@@ -275,6 +285,7 @@ class Viewport:
         begun = old is None or old.request.key != picture.request.key or old.request.scale != picture.request.scale
         self.counts["subframes"] += picture.subframes - (0 if begun else old.subframes)
         self._picture = picture
+        self._lost = False
         if begun:
             if picture.first > 0.0:
                 self._first = picture.first
@@ -368,7 +379,11 @@ def view_camera(view: bpy.types.RegionView3D, scene: Scene, size: tuple[int, int
         world_from_view[:3, 3] += world_from_view[:3, 2] * back
         clip_from_view[2, 3] -= clip_from_view[2, 2] * -back
         near, far = max(near + back, 1e-3 * radius), far + back
-    return Camera(world_from_view, clip_from_view, near, far, aperture, focus or 10.0, name)
+    camera = Camera(world_from_view, clip_from_view, near, far, aperture, focus or 10.0, name)
+    if aperture > 0.0:
+        lens = scene.camera
+        camera.blades, camera.blade_turn, camera.blade_ratio = lens.blades, lens.blade_turn, lens.blade_ratio
+    return camera
 
 
 def _clip_planes(clip_from_view: np.ndarray) -> tuple[float, float]:

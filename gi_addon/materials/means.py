@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..scene import Image, Link, Node, ShaderGraph
+from .spectrum import blackbody
 
 _GRAY = np.array([0.2126, 0.7152, 0.0722])
 # Operations of the Math node on two numbers that are known before rendering.
@@ -177,6 +178,11 @@ class _Walk:
                                get("Color2", 0.5), depth)  # fmt: skip
         if node.kind == "VALTORGB" and node.params.get("table"):
             return np.mean([row[:3] for row in node.params["table"]], axis=0)
+        if node.kind == "BLACKBODY":
+            return blackbody(self.number(get("Temperature", 1500.0), depth))
+        if node.kind == "LIGHT_FALLOFF":
+            # With the distance squared as lights have it anyway; other falloffs count as that.
+            return self.number(get("Strength", 100.0), depth)
         if node.kind == "LIGHT_PATH":
             return 0.0 if value.output == "Is Camera Ray" else 1.0
         for name in ("Color", "Color1", "Value", "Fac", "Vector"):

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from ..scene import Node
 from .compiler import CLOSURE, COLOR, FLOAT, VECTOR, Compiler, Value
 from .means import BINARY
+from .spectrum import sheen_table
 
 NODES: dict[str, Callable[[Compiler, Node], dict[str, Value]]] = {}
 
@@ -32,6 +33,8 @@ INEXACT = {
     ("NEW_GEOMETRY", "Pointiness"): "Pointiness is ½",
     ("NEW_GEOMETRY", "Random Per Island"): "Random Per Island is ½",
     ("NEW_GEOMETRY", "Parametric"): "Parametric is 0",
+    ("HAIR_INFO", "Length"): "Length is 0",
+    ("HAIR_INFO", "Thickness"): "Thickness is 0",
     ("LIGHT_PATH", "Ray Length"): "Ray Length is 0",
 }
 # Best constants of nodes that are not evaluated, by output.
@@ -46,9 +49,9 @@ _FALLBACK = {
 def fallback(c: Compiler, n: Node) -> dict[str, Value]:
     """Any node without a function: its colour inputs' mean, or a constant that stands for it."""
     c.approximate(n, f"node type {n.kind} is not evaluated")
-    if n.kind in ("BSDF_TOON", "BSDF_HAIR", "BSDF_HAIR_PRINCIPLED", "BSDF_SHEEN", "BSDF_RAY_PORTAL"):
+    if n.kind in ("BSDF_TOON", "BSDF_HAIR", "BSDF_HAIR_PRINCIPLED", "BSDF_RAY_PORTAL"):
         return _outputs(diffuse(c, n))
-    if n.kind in ("HOLDOUT", "VOLUME_ABSORPTION", "VOLUME_SCATTER", "PRINCIPLED_VOLUME", "VOLUME_COEFFICIENTS"):
+    if n.kind in ("VOLUME_ABSORPTION", "VOLUME_SCATTER", "PRINCIPLED_VOLUME", "VOLUME_COEFFICIENTS"):
         return {name: Value(CLOSURE, "closure_none()") for name in ("BSDF", "Holdout", "Volume", "Shader")}
     colors = [v for k, v in n.inputs.items() if k.startswith("Color") and isinstance(v, tuple)]
     mean = tuple(sum(v[i] for v in colors) / len(colors) for i in range(3)) if colors else (0.5, 0.5, 0.5)
@@ -83,8 +86,8 @@ def _normal(c: Compiler, n: Node, name: str = "Normal") -> str:
 def principled(c: Compiler, n: Node) -> dict[str, Value]:
     """Blender's Principled BSDF: alpha over (metal | glass | (specular over diffuse and subsurface)), plus emission.
 
-    Sheen, anisotropy and thin film are left out and said so; the coat is a second dielectric layer folded into the one
-    glossy lobe.
+    Anisotropy and thin film are left out and said so. The coat is a second dielectric layer folded into the one glossy lobe;
+    sheen takes its share from all below and is scattered as diffuse light.
     """
     r = c.result
     base = c.input(n, "Base Color", COLOR, (0.8, 0.8, 0.8))
@@ -96,7 +99,8 @@ def principled(c: Compiler, n: Node) -> dict[str, Value]:
     alpha = c.input(n, "Alpha", FLOAT, 1.0)
     normal = _normal(c, n)
     multi = "1.0" if n.params.get("distribution", "MULTI_GGX") == "MULTI_GGX" else "0.0"
-    for name, what in (("Sheen Weight", "sheen"), ("Anisotropic", "anisotropy"), ("Thin Film Thickness", "thin film")):
+    for name, what in (("Anisotropic", "anisotropy"), ("Diffuse Roughness", "diffuse roughness"),
+                       ("Thin Film Thickness", "thin film")):  # fmt: skip
         if not c.input(n, name, FLOAT, 0.0).is_zero:
             c.approximate(n, f"{what} is left out")
     out = c.name()
@@ -130,10 +134,34 @@ def principled(c: Compiler, n: Node) -> dict[str, Value]:
             f"principled_coat({out}, {coat.text}, {c.input(n, 'Coat Roughness', FLOAT, 0.03).text}, "
             f"{c.input(n, 'Coat IOR', FLOAT, 1.5).text}, {c.input(n, 'Coat Tint', COLOR, (1.0, 1.0, 1.0)).text}, point);"
         )
+    sheen = c.input(n, "Sheen Weight", FLOAT, 0.0)
+    if not sheen.is_zero:
+        r.diffuse = True
+        first = _sheen(c, n, c.input(n, "Sheen Roughness", FLOAT, 0.5))
+        sheen_tint = c.input(n, "Sheen Tint", COLOR, (1.0, 1.0, 1.0))
+        c.statement(f"principled_sheen({out}, saturate({sheen.text}), {sheen_tint.text}, {first}, {normal}, point);")
     if not alpha.equals(1.0):
         r.transparent = True
         c.statement(f"{out} = closure_alpha({out}, {alpha.text});")
     return {"BSDF": Value(CLOSURE, out)}
+
+
+def _sheen(c: Compiler, n: Node, roughness: Value) -> int:
+    """The first parameter of sheen's albedo at the node's roughness; one that varies counts as ½."""
+    if roughness.constant is None:
+        c.approximate(n, "sheen's roughness counts as ½")
+    return c.table(sheen_table(roughness.constant[0] if roughness.constant else 0.5))[0]
+
+
+@node("BSDF_SHEEN")
+def sheen(c: Compiler, n: Node) -> dict[str, Value]:
+    """Fabric's shine, scattered as diffuse light."""
+    c.result.diffuse = True
+    if n.params.get("distribution", "MICROFIBER") != "MICROFIBER":
+        c.approximate(n, "Ashikhmin's sheen is taken for the microfibre one")
+    color = c.input(n, "Color", COLOR, (0.8,) * 3)
+    first, normal = _sheen(c, n, c.input(n, "Roughness", FLOAT, 0.5)), _normal(c, n)
+    return {"BSDF": c.variable(CLOSURE, f"closure_diffuse({color.text} * sheen_albedo({first}, {normal}, point), {normal})")}
 
 
 @node("BSDF_DIFFUSE")
@@ -148,10 +176,16 @@ def diffuse(c: Compiler, n: Node) -> dict[str, Value]:
 
 @node("BSDF_GLOSSY", "BSDF_ANISOTROPIC", "BSDF_METALLIC")
 def glossy(c: Compiler, n: Node) -> dict[str, Value]:
-    """GGX without Fresnel (Glossy), or with Schlick's towards white (Metallic)."""
+    """GGX without Fresnel (Glossy), or with Schlick's from F0 towards white (Metallic)."""
     c.result.glossy = True
     metallic = n.kind == "BSDF_METALLIC"
     color = c.input(n, "Base Color" if metallic else "Color", COLOR, (0.8, 0.8, 0.8))
+    if metallic and n.params.get("fresnel_type") == "PHYSICAL_CONDUCTOR":
+        index = c.input(n, "IOR", VECTOR, (2.757, 2.513, 2.231))
+        extinction = c.input(n, "Extinction", VECTOR, (3.867, 3.404, 3.009))
+        color = c.variable(COLOR, f"conductor_f0({index.text}, {extinction.text})")
+    elif metallic and not c.input(n, "Edge Tint", COLOR, (1.0, 1.0, 1.0)).equals(1.0):
+        c.approximate(n, "the edge tint is left out")
     roughness = c.input(n, "Roughness", FLOAT, 0.5)
     if not c.input(n, "Anisotropy", FLOAT, 0.0).is_zero:
         c.approximate(n, "anisotropy is left out")
@@ -209,6 +243,12 @@ def transparent(c: Compiler, n: Node) -> dict[str, Value]:
     c.result.transparent = True
     color = c.input(n, "Color", COLOR, (1.0, 1.0, 1.0))
     return {"BSDF": c.variable(CLOSURE, f"closure_transparent({color.text})")}
+
+
+@node("HOLDOUT")
+def holdout(c: Compiler, n: Node) -> dict[str, Value]:
+    """A hole in the picture; to light it is black."""
+    return {"Holdout": Value(CLOSURE, "closure_holdout()")}
 
 
 @node("BSDF_TRANSLUCENT")

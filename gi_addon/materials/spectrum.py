@@ -39,6 +39,35 @@ def blackbody_table() -> list[tuple[float, ...]]:
     return [(*row, 1.0) for row in np.maximum(rgb, 0.0).tolist()]
 
 
+# Directional albedo of Cycles' microfibre sheen of roughness 0, 1/8 … 1 (rows) seen at cosine 0, 1/8 … 1 (columns):
+# measured on a sphere in Cycles' Diffuse Color (docs/materials.md).
+_SHEEN = np.array([
+    [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+    [0.0131, 0.0715, 0.0024, 0.0003, 0.0001, 0.0, 0.0, 0.0, 0.0],
+    [0.0201, 0.3183, 0.1022, 0.0270, 0.0074, 0.0025, 0.0010, 0.0005, 0.0003],
+    [0.0208, 0.4482, 0.2552, 0.1288, 0.0608, 0.0279, 0.0131, 0.0063, 0.0033],
+    [0.0208, 0.5196, 0.3679, 0.2438, 0.1539, 0.0944, 0.0563, 0.0330, 0.0186],
+    [0.0209, 0.5682, 0.4503, 0.3430, 0.2536, 0.1842, 0.1307, 0.0915, 0.0619],
+    [0.0212, 0.6098, 0.5166, 0.4269, 0.3467, 0.2788, 0.2226, 0.1765, 0.1380],
+    [0.0219, 0.6481, 0.5723, 0.4972, 0.4285, 0.3689, 0.3180, 0.2746, 0.2370],
+    [0.0226, 0.6850, 0.6196, 0.5562, 0.4988, 0.4496, 0.4074, 0.3724, 0.3419],
+])  # fmt: skip
+
+
+def sheen_table(roughness: float) -> list[tuple[float, ...]]:
+    """Sheen's albedo over the cosine of the view, 9 rows, at one roughness."""
+    at = np.clip(roughness, 0.0, 1.0) * 8.0
+    row = [float(np.interp(at, np.arange(9), _SHEEN[:, k])) for k in range(9)]
+    return [(v, v, v, 1.0) for v in row]
+
+
+def blackbody(temperature: float) -> np.ndarray:
+    """The colour (3,) at one temperature, from the table."""
+    table = np.array(blackbody_table())[:, :3]
+    at = (1e4 / np.clip(temperature, 800.0, 12000.0) - 1e4 / 12000.0) / (1e4 / 800.0 - 1e4 / 12000.0) * (_ENTRIES - 1)
+    return np.stack([np.interp(at, np.arange(_ENTRIES), table[:, k]) for k in range(3)])
+
+
 @cache
 def wavelength_table() -> list[tuple[float, ...]]:
     """Colours (Rec.709) of single wavelengths, 380 to 780 nm by 5 nm, over 2.52: Blender's scale, after which no component

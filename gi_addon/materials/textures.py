@@ -9,6 +9,7 @@ import math
 from ..scene import Node
 from .compiler import COLOR, FLOAT, VECTOR, Compiler, Value
 from .nodes import _coordinate, _normal, node
+from .sky import sun_angles
 from .spectrum import blackbody_table, wavelength_table
 
 _DIMENSIONS = {"1D": 1, "2D": 2, "3D": 3, "4D": 4}
@@ -173,6 +174,29 @@ def brick(c: Compiler, n: Node) -> dict[str, Value]:
     return {"Color": color, "Fac": Value(FLOAT, f"{v}.y")}
 
 
+@node("TEX_SKY")
+def sky_texture(c: Compiler, n: Node) -> dict[str, Value]:
+    """An atmosphere by its image ``image`` (:mod:`.sky`) and the sun's disc. With ``sun_light`` the sun shines as a light
+    of its own, and maps of the world for light leave it out."""
+    index = n.params.get("image")
+    if index is None:
+        c.approximate(n, f"the {n.params.get('sky_type', 'given')} sky model is a constant")
+        return {"Color": c.constant((0.3, 0.3, 0.3), COLOR)}
+    if n.params.get("sky_type") == "HOSEK_WILKIE":
+        c.approximate(n, "Hosek's and Wilkie's sky is taken for multiple scattering")
+    c.include("nodes/sky.glsl")
+    sampler = c.image(index, "Linear", "REPEAT")
+    elevation, rotation = sun_angles(n.params)
+    size = float(n.params.get("sun_size", 0.00951)) if n.params.get("sun_disc", False) else -1.0
+    intensity = float(n.params.get("sun_intensity", 1.0))
+    ends = [c.constant(tuple(v * intensity for v in n.params.get(k, (0.0,) * 3)), COLOR).text for k in ("sun_low", "sun_high")]
+    numbers = ", ".join(c.constant(v, FLOAT).text for v in (elevation, rotation, size))
+    shown = "WORLD_SUN_DISC" if n.params.get("sun_light") and c.world else "1"
+    co = _coordinate(c, n, "point.position_ws" if c.world else "point.generated")
+    text = f"node_sky({sampler}, {co}, {numbers}, {ends[0]}, {ends[1]}, {shown})"
+    return {"Color": c.variable(COLOR, text)}
+
+
 # --- light and colour -------------------------------------------------------------------------------------------------
 
 
@@ -252,6 +276,17 @@ def tangent(c: Compiler, n: Node) -> dict[str, Value]:
     axis = "XYZ".index(n.params.get("axis", "Z"))
     c.include("nodes/spaces.glsl")
     return {"Tangent": c.variable(VECTOR, f"node_tangent_radial({axis}, point)")}
+
+
+@node("HAIR_INFO")
+def hair_info(c: Compiler, n: Node) -> dict[str, Value]:
+    """Strands carry (1, place along them, random)."""
+    v = c.attribute("attr:.hair")
+    zero = Value(FLOAT, "0.0")
+    return {
+        "Is Strand": Value(FLOAT, f"{v}.x"), "Intercept": Value(FLOAT, f"{v}.y"), "Random": Value(FLOAT, f"{v}.z"),
+        "Length": zero, "Thickness": zero, "Tangent Normal": Value(VECTOR, "point.normal_ws"),
+    }  # fmt: skip
 
 
 @node("SQUEEZE")

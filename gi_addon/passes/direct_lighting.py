@@ -15,10 +15,12 @@ class DirectLighting(Pass):
     title = "Direct Lighting Computation"
     figure = "Direct Lighting Computation"
     reads = (
-        "lights", Optional("lights.views"), Optional("shadow.depth"), Optional("rsm.depth"), "gbuffer.depth", "gbuffer.normal",
+        "lights", Optional("lights.views"), Optional("shadow.depth"), Optional("rsm.depth"),
+        Optional("shadow.cones"), "gbuffer.depth", "gbuffer.normal",
         Optional("gbuffer.specular", ("direct.glossy",)), Optional("gbuffer.lobe", ("direct.glossy",)),
         Optional("brdf.energy", ("direct.glossy",)), Optional("brdf.average", ("direct.glossy",)),
         Optional("direct.subsurface", ("direct.diffuse",)),
+        Optional("screen.light", ("direct.diffuse",)),
     )  # fmt: skip
     writes = (
         Texture("direct.diffuse", "direct_diffuse", "radiance a white Lambert surface would reflect, W/(m²·sr)",
@@ -37,7 +39,7 @@ class DirectLighting(Pass):
     shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "passes/direct_lighting_frag.glsl"}}
 
     def defines(self, facts: Facts) -> dict[str, int]:
-        return medium_defines(facts)
+        return {**medium_defines(facts), "HAS_SSDO_PLANES": 0}
 
     def absent(self, facts: Facts) -> str | None:
         return None if facts.lit else "no light shines"

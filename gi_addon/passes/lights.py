@@ -28,6 +28,7 @@ class LightList(Pass):
     """Sends the lights to the GPU."""
 
     title = "Light List"
+    reads = (Optional("world.guide"),)
     writes = (
         Buffer("lights", "lights", "the lights' points of this sub-frame", "Light", LIGHT,
                lambda f: max(1, len(f.rig.sources))),
@@ -50,6 +51,7 @@ class ShadowMaps(Pass):
     """Depth of the scene from each light's point."""
 
     title = "Shadow Maps"
+    reads = (Optional("world.guide"),)
     writes = (
         Texture("shadow.depth", "shadow_depth", "depth along each map's axis, world units", "r32f",
                 lambda f: f.rig.shadow.size),

@@ -17,7 +17,7 @@ class Resolve(Pass):
     title = "Resolve"
     writes = (
         Texture("film", "film", "sums over sub-frames, one layer per quantity", "rgba32f",
-                lambda f: (*f.resolution, len(f.layers)), layers=True, access="readwrite"),
+                lambda f: (*f.picture, len(f.layers)), layers=True, access="readwrite"),
     )  # fmt: skip
     uniforms = (Uniform("first_subframe", "int", "1 in the first sub-frame, which overwrites the film"),)
     shaders = {"main": {"compute": "passes/resolve_comp.glsl"}}
@@ -29,7 +29,8 @@ class Resolve(Pass):
         )
 
     def defines(self, facts: Facts) -> dict[str, int]:
-        return {f"LAYER_{name.upper()}": facts.layers.index(name) if name in facts.layers else -1 for name in LAYERS}
+        layers = {name: facts.layers.index(name) if name in facts.layers else -1 for name in LAYERS}
+        return {"WORLD_VISIBLE": int(facts.world_visible)} | {f"LAYER_{name.upper()}": at for name, at in layers.items()}
 
     def run(self, frame: Frame, planned: Planned) -> None:
         units = len(planned.texture_reads())
@@ -38,5 +39,5 @@ class Resolve(Pass):
         frame.gpu.bind_world_params()
         frame.gpu.bind_images(frame.gpu.world, units)
         frame.set(program, first_subframe=int(frame.subframe == 0))
-        frame.compute(planned, program, planned.facts.resolution)
+        frame.compute(planned, program, planned.facts.picture)
         frame.gpu.unbind_images(units, len(frame.gpu.world.images))

@@ -9,7 +9,7 @@ from ..facts import Facts
 from ..frame import Frame
 from ..gl.structs import struct
 from ..graph import Buffer, Pass, Planned
-from ..materials import mean_albedo
+from ..materials import mean_albedo, mean_emission
 from ..scene import DIFFUSE, Scene
 from ..sequence import sobol_2d
 
@@ -59,7 +59,12 @@ def surface_points(scene: Scene, count: int, per_set: int) -> np.ndarray:
     """``count`` SURFACE_SAMPLEs by the low-discrepancy sequence; in sets of ``per_set`` each stands for its share of the
     area. All zero where the scene has no area."""
     out = np.zeros(count, SURFACE_SAMPLE)
-    albedos = [mean_albedo(m.graph, scene.images) for m in scene.materials]
+    # Lamps are left out: what they reflect is nothing beside what they shine, and between a lamp and the ceiling it hangs
+    # from, closer than a cell, light would be handed to and fro and leak.
+    albedos = [
+        np.zeros(3) if (mean_emission(m.graph, scene.images) > 0.0).any() else mean_albedo(m.graph, scene.images)
+        for m in scene.materials
+    ]
     corners, colors = [], []
     instances = scene.instances
     for i in range(len(instances)):

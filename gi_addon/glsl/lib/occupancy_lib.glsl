@@ -50,6 +50,43 @@ bool cells_block(vec3 from_ws, vec3 to_ws)
     return blocked;
 }
 
+// The distance (in cells) at which a ray from `start` (in cells) enters the grid, and the one at which it leaves.
+vec2 cells_span(vec3 start, vec3 inverse)
+{
+    vec3 a = -start * inverse;
+    vec3 b = (vec3(textureSize(occupancy, 0)) - start) * inverse;
+    vec3 low = min(a, b);
+    vec3 high = max(a, b);
+    return vec2(max(max(low.x, low.y), max(low.z, 0.0)), min(high.x, min(high.y, high.z)));
+}
+
+// Distance (m) along the unit `direction` to the first cell with a surface in it after a free one; −1 if there is none.
+float cells_distance(vec3 from_ws, vec3 direction)
+{
+    vec3 start = (from_ws - cell_origin_ws) / cell_size;
+    direction = mix(direction, vec3(1e-6), lessThan(abs(direction), vec3(1e-6)));
+    vec3 inverse = 1.0 / direction;
+    vec3 forward = step(0.0, direction);
+    vec2 span = cells_span(start, inverse);
+    ivec3 last = textureSize(occupancy, 0) - 1;
+    float t = span.x + 1e-3;
+    bool free_before = span.x > 0.0;
+    float hit = -1.0;
+    for (int i = 0; i < CELL_STEPS; ++i) {
+        if (t < span.y && hit < 0.0) {
+            vec3 p = start + direction * t;
+            float level = floor(texelFetch(occupancy, clamp(ivec3(floor(p)), ivec3(0), last), 0).r * 255.0 + 0.5);
+            bool solid = level < 0.5;
+            hit = solid && free_before ? t : hit;
+            free_before = free_before || !solid;
+            t += max(cell_exit(p, inverse, forward, exp2(max(level - 1.0, 0.0))), 0.0) + 1e-3;
+        }
+    }
+    // Out of steps within the grid: among surfaces, so not past them.
+    hit = hit < 0.0 && t < span.y ? t : hit;
+    return hit < 0.0 ? -1.0 : hit * cell_size;
+}
+
 // The next run of occupied cells along a ray in cells (`direction` a unit vector without zeros) that free cells come before,
 // from `t` on; `t` ends behind it. `far` in cells. False where there is none.
 bool cells_next_run(vec3 start, vec3 direction, float far, inout float t, inout bool free_before, out vec2 run)

@@ -3,6 +3,7 @@
 // all sides), 0 without tables, as if smooth (shadow maps, which only ask what passes).
 
 #include "lib/surface_lib.glsl"
+#include "nodes/color.glsl"
 
 // Albedo of a glossy layer towards the viewer, or to all sides.
 vec3 surface_layer_albedo(SurfacePoint point, vec3 n, vec3 f0, float f90, float roughness, float eta, float multiscatter)
@@ -110,6 +111,30 @@ void principled_coat(inout Closure c, float weight, float roughness, float ior, 
     c.roughness += saturate(roughness) * weight;
     c.eta += eta * weight;
     c.normal_ws = normal_ws;
+}
+
+// Albedo of sheen towards the viewer, from its table; seen by a light map, that towards the light.
+float sheen_albedo(int first, vec3 n, SurfacePoint point)
+{
+    return node_table(first, 9, saturate(abs(dot(n, point.view_ws))), TABLE_LINEAR).x;
+}
+
+// Fibres on top: what they reflect is taken from all below, and leaves in all directions.
+void principled_sheen(inout Closure c, float weight, vec3 tint, int first, vec3 n, SurfacePoint point)
+{
+    vec3 normal_ws = c.normal_ws;
+    vec3 albedo = max(tint, vec3(0.0)) * (weight * sheen_albedo(first, n, point));
+    vec3 emission = c.emission;
+    c = closure_scale(c, saturate(1.0 - max3(albedo)));
+    c.emission = emission;
+    c.diffuse += albedo;
+    c.normal_ws = normal_ws;
+}
+
+// Reflectance at normal incidence of index n and extinction k.
+vec3 conductor_f0(vec3 n, vec3 k)
+{
+    return ((n - 1.0) * (n - 1.0) + k * k) / ((n + 1.0) * (n + 1.0) + k * k);
 }
 
 Closure closure_glass(vec3 color, float roughness, float ior, vec3 n, SurfacePoint point)

@@ -12,6 +12,10 @@
 #include "lib/medium_lib.glsl"
 #endif
 
+#if HAS_SSDO_PLANES
+#include "engines/ssdo/shadow_lib.glsl"
+#endif
+
 // GGX alpha after convolution with a uniform disc of angular radius θ: the half vector turns half as far as the light,
 // whose variance per axis is θ²/4, so slopes gain θ²/16; α² is twice the slopes' variance (Beckmann's relation).
 float widened_alpha(float alpha, float angle) { return min(sqrt(alpha * alpha + angle * angle / 8.0), 1.0); }
@@ -56,6 +60,9 @@ void main()
             vec3 receiver_ws = position_ws + n * depth_bulge.g;
             vec3 receiver_ng = behind ? n : ng;
             float visible = 1.0;
+#if HAS_SHADOW_CONES
+            visible = texelFetch(shadow_cones, ivec3(pixel, i), 0).r;
+#else
             if (light.views > 0) {
                 LightView v = light_views[light_view_of(light, position_ws)];
 #if HAS_SHADOW_DEPTH
@@ -69,15 +76,21 @@ void main()
                 }
 #endif
             }
+#endif
 #if HAS_MEDIUM
             arriving *= medium_transmittance(position_ws, l, light_is_directional(light) ? 1e30 : length(light.position_ws - position_ws));
 #endif
+#if HAS_SSDO_PLANES
+            if (visible > 0.0) {
+                visible *= screen_visibility(light, receiver_ws, l, fract(turn * 0.159154943 + 0.618034 * float(i))); // 1/2π
+            }
+#endif
             vec3 irradiance = arriving * cos_l;
-            open_light += irradiance;
-            lit_light += irradiance * visible;
+            open_light += irradiance * light.diffuse;
+            lit_light += irradiance * visible * light.diffuse;
 #if HAS_DIRECT_GLOSSY
             if (has_lobe && visible > 0.0) {
-                glossy += arriving * visible * gain * ggx_eval(lobe, widened_alpha(alpha, angle), n, v, l);
+                glossy += light.glossy * arriving * visible * gain * ggx_eval(lobe, widened_alpha(alpha, angle), n, v, l);
             }
 #endif
         }
@@ -85,6 +98,9 @@ void main()
 #if HAS_DIRECT_SUBSURFACE
         vec4 below = texelFetch(direct_subsurface, pixel, 0);
         diffuse = mix(diffuse, below.rgb, below.a);
+#endif
+#if HAS_SCREEN_LIGHT
+        diffuse += texelFetch(screen_light, pixel, 0).rgb; // the world and emissive pixels, where screen space gathers them
 #endif
     }
 #if HAS_DIRECT_DIFFUSE

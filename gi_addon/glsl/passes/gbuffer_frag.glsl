@@ -22,6 +22,11 @@ void main()
         discard;
     }
 #endif
+    // A share of the sub-frames shows the hole: nothing of the surface, and a mark where its bulge would stand.
+    bool held = c.holdout > 0.0 && surface_is_there(c.holdout / max(opacity, 1e-6), 2u);
+    if (held) {
+        c = closure_none();
+    }
     float gain = opacity > 0.0 ? 1.0 / opacity : 1.0;
     vec3 n = safe_normalize(c.normal_ws);
     if (dot(n, n) < 0.5) {
@@ -29,7 +34,7 @@ void main()
     }
     // Rounding of the interpolants alone lifts flat triangles by parts in a million of their place.
     float bulge = surface_bulge();
-    gbuf_depth = vec2(depth, bulge > 1e-5 * length(vary_relative_ws) ? bulge : 0.0);
+    gbuf_depth = vec2(depth, held ? -1.0 : bulge > 1e-5 * length(vary_relative_ws) ? bulge : 0.0);
 #if HAS_GBUF_NORMAL
     gbuf_normal = vec4(octahedral_encode(n), octahedral_encode(p.geometric_normal_ws));
 #endif

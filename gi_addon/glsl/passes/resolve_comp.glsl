@@ -11,7 +11,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 
 void add(int layer, ivec2 pixel, vec4 value)
 {
-    ivec3 at = ivec3(pixel, layer);
+    ivec3 at = ivec3(pixel - view.margin, layer);
     // A number that is not one would stay in the film for good. Nothing upstream should make one; the non-finite scan of
     // the stability suite reads the passes before this point.
     value = mix(value, vec4(0.0), bvec4(!is_finite(value.x), !is_finite(value.y), !is_finite(value.z), !is_finite(value.w)));
@@ -24,10 +24,13 @@ void main()
     if (any(greaterThanEqual(pixel, imageSize(film).xy))) {
         return;
     }
+    pixel += view.margin; // the film holds the picture alone
     vec2 uv = (vec2(pixel) + 0.5) * view.inverse_resolution;
     float depth = 0.0;
+    bool held = false;
 #if HAS_GBUF_DEPTH
     depth = texelFetch(gbuf_depth, pixel, 0).r;
+    held = texelFetch(gbuf_depth, pixel, 0).g < 0.0;
 #endif
     bool surface = depth > 0.0;
 
@@ -48,13 +51,26 @@ void main()
         diffuse_color = texelFetch(gbuf_diffuse, pixel, 0).rgb;
 #endif
 #if HAS_DIRECT_DIFFUSE
-        diffuse_direct = texelFetch(direct_diffuse, pixel, 0).rgb * diffuse_color;
+        diffuse_direct = texelFetch(direct_diffuse, pixel, 0).rgb;
+#if HAS_SUBSURFACE_DIRECT
+        vec4 below_direct = texelFetch(subsurface_direct, pixel, 0);
+        diffuse_direct = mix(diffuse_direct, below_direct.rgb, below_direct.a);
+#endif
+        diffuse_direct *= diffuse_color;
 #endif
 #if HAS_INDIRECT_DIFFUSE
-        diffuse_indirect = texelFetch(indirect_diffuse, pixel, 0).rgb * diffuse_color;
+        diffuse_indirect = texelFetch(indirect_diffuse, pixel, 0).rgb;
+#if HAS_SUBSURFACE_INDIRECT
+        vec4 below_indirect = texelFetch(subsurface_indirect, pixel, 0);
+        diffuse_indirect = mix(diffuse_indirect, below_indirect.rgb, below_indirect.a);
+#endif
+        diffuse_indirect *= diffuse_color;
 #endif
 #if HAS_DIRECT_GLOSSY
         glossy_direct = texelFetch(direct_glossy, pixel, 0).rgb;
+#endif
+#if HAS_REFLECTED_SOURCES
+        glossy_direct += texelFetch(reflected_sources, pixel, 0).rgb;
 #endif
 #if HAS_INDIRECT_GLOSSY
         glossy_indirect = texelFetch(indirect_glossy, pixel, 0).rgb;
@@ -62,14 +78,15 @@ void main()
 #if HAS_GBUF_EMISSION
         emission = texelFetch(gbuf_emission, pixel, 0).rgb;
 #endif
-    } else if (view.film_transparent < 0.5) {
+    } else if (view.film_transparent < 0.5 && WORLD_VISIBLE != 0) {
         environment = world_radiance(normalize(ray_direction_ws(uv)));
     }
 #if HAS_GBUF_TRANSMISSION
     // Behind a refracting surface everything belongs to Transmission: what the technique found along the refracted ray, or
     // what lies straight behind. Direct is what shines by itself (Cycles counts one refraction, then the light).
-    through_color = texelFetch(gbuf_transmission, pixel, 0).rgb;
-    if (any(notEqual(through_color, vec3(1.0)))) {
+    vec4 tint = texelFetch(gbuf_transmission, pixel, 0);
+    through_color = tint.rgb;
+    if (tint.a < 0.5) {
         through_direct = (emission + environment) * through_color;
         through_indirect = (diffuse_direct + diffuse_indirect + glossy_direct + glossy_indirect) * through_color;
 #if HAS_TRANSMISSION_INDIRECT
@@ -107,7 +124,7 @@ void main()
     environment *= passes;
 
 #if LAYER_COMBINED >= 0
-    float alpha = surface || view.film_transparent < 0.5 ? 1.0 : 0.0;
+    float alpha = !held && (surface || view.film_transparent < 0.5) ? 1.0 : 0.0;
     add(LAYER_COMBINED, pixel, vec4(diffuse_direct + diffuse_indirect + glossy_direct + glossy_indirect +
                                         through_direct + through_indirect + volume + emission + environment,
                                     alpha));
@@ -115,7 +132,7 @@ void main()
 #if LAYER_DEPTH >= 0
     // The first sub-frame's depth, as Cycles keeps its first sample's: a mean of depths is no depth. Nothing is 1e10.
     if (first_subframe == 1) {
-        imageStore(film, ivec3(pixel, LAYER_DEPTH), vec4(surface ? depth : 1e10));
+        imageStore(film, ivec3(pixel - view.margin, LAYER_DEPTH), vec4(surface ? depth : 1e10));
     }
 #endif
 #if LAYER_NORMAL >= 0

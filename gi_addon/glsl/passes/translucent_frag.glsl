@@ -23,12 +23,18 @@ void main()
     float share = max(1.0 - opacity - vector_mean(c.transparent), 1e-4);
     vec3 color = (c.transmission + c.translucent) / share;
 #if TINT_ONLY
-    gbuf_transmission = vec4(color, 1.0);
+    gbuf_transmission = vec4(color, 0.0); // alpha says that there is one: clear glass has tint 1
 #else
     vec3 n = safe_normalize(c.normal_ws);
     n = dot(n, n) < 0.5 ? p.normal_ws : n;
     float weight = luminance(c.transmission);
     float eta = weight > 0.0 ? max(c.transmission_eta / weight, 1e-3) : 1.0;
+#if HAS_TRANSLUCENT_BACK_DEPTH
+    translucent_back_depth = depth;
+#endif
+#if HAS_TRANSLUCENT_BACK_NORMAL
+    translucent_back_normal = vec4(octahedral_encode(n), octahedral_encode(p.geometric_normal_ws));
+#endif
 #if HAS_TRANSLUCENT_DEPTH
     translucent_depth = depth;
 #endif

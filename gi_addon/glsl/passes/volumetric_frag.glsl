@@ -11,10 +11,20 @@
 #include "lib/light_lib.glsl"
 #include "lib/math_lib.glsl"
 
+#if RADIAL_BLUR
+#include "engines/ssdo/radial_lib.glsl"
+#endif
+
+#if VOXEL_VISIBILITY
+#include "engines/vct/air_lib.glsl"
+#endif
+
 // Whether light gets to a point of the air: its texel's depth alone, the sub-frames blur it.
 float air_visibility(Light light, vec3 position_ws)
 {
-#if HAS_LIGHT_VIEWS
+#if VOXEL_VISIBILITY
+    return voxel_visibility(light, position_ws);
+#elif HAS_LIGHT_VIEWS
     if (light.views <= 0) {
         return 1.0;
     }
@@ -166,7 +176,12 @@ void main()
     float offset = fract(step_turn + unit_float(hash_u32(uvec2(pixel + view.pixel_offset))));
     if (length_ > 0.0 && max3(medium_scattering) > 0.0) {
         for (int i = 0; i < light_count; ++i) {
+#if RADIAL_BLUR
+            float share = radial_visibility(lights[i], offset);
+            light_sum += share > 0.0 ? share * scattered(lights[i], origin_ws, direction, span, offset) : vec3(0.0);
+#else
             light_sum += scattered(lights[i], origin_ws, direction, span, offset);
+#endif
         }
     }
 #endif

@@ -35,7 +35,7 @@ SurfacePoint surface_point(vec3 view_ws)
     }
     p.geometric_normal_ws = ng;
     p.normal_ws = dot(n, n) > 0.5 ? n : ng;
-    p.window = gl_FragCoord.xy * view.inverse_resolution;
+    p.window = (gl_FragCoord.xy - float(view.margin)) / (view.resolution - 2.0 * float(view.margin));
     p.position_vs = vec3(1.0, 1.0, -1.0) * (view.view_from_world * vec4(vary_position_ws, 1.0)).xyz;
 #if SURFACE_OBJECT_SPACE
     p.position_os = vary_position_os;

@@ -16,8 +16,10 @@ void main()
         return;
     }
     SurfaceSample s = surface_points[point_first + i];
-    vec3 front = gather_some_vpls(s.position_ws, s.normal_ws, s.normal_ws, bounce_first, 1).radiance * PI;
-    vec3 back = gather_some_vpls(s.position_ws, -s.normal_ws, -s.normal_ws, bounce_first, 1).radiance * PI;
+    // Few points carry all of a sub-frame's further light: discs of full size keep near ones from outshining the rest.
+    float alone = float(view.subframes);
+    vec3 front = gather_some_vpls(s.position_ws, s.normal_ws, s.normal_ws, bounce_first, 1, alone).radiance * PI;
+    vec3 back = gather_some_vpls(s.position_ws, -s.normal_ws, -s.normal_ws, bounce_first, 1, alone).radiance * PI;
     float a = luminance(front);
     float b = luminance(back);
     float u = unit_float(hash_u32(uvec3(uint(i), view.subframe, uint(vpl_count))));
@@ -28,6 +30,6 @@ void main()
     vpl.normal_ws = chosen ? s.normal_ws : -s.normal_ws;
     vpl.light = -1;
     vpl.flux = share > 0.0 ? s.albedo * (chosen ? front : back) * (s.area * (a + b) / share) : vec3(0.0);
-    vpl.area = s.area / float(view.subframes);
+    vpl.area = s.area;
     vpls[vpl_count + i] = vpl;
 }

@@ -37,8 +37,10 @@ struct Gathered {
     vec4 direction;   // Σ luminance × direction to the source; Σ luminance
 };
 
-// Every `stride`-th virtual light from `first` on, each standing for `stride` of them.
-Gathered gather_some_vpls(vec3 position_ws, vec3 n, vec3 ng, int first, int stride)
+// Every `stride`-th virtual light from `first` on, each standing for `stride` of them, its disc as many times as large. A
+// light's own disc is its share among those of all sub-frames, which a pixel's mean over them has; where the sum is not
+// averaged so, `alone` is their number, and the disc the sub-frame's.
+Gathered gather_some_vpls(vec3 position_ws, vec3 n, vec3 ng, int first, int stride, float alone)
 {
     Gathered g = Gathered(vec3(0.0), vec4(0.0));
 #if HAS_OCCUPANCY
@@ -68,14 +70,15 @@ Gathered gather_some_vpls(vec3 position_ws, vec3 n, vec3 ng, int first, int stri
         float cos_x = max(dot(w, n), 0.0);
         // Φ/A · K A/(1 + K A) without the area: Φ cos cos / (π d² + cos cos A).
         float product = cos_p * cos_x;
-        float kernel = product / (PI * d2 + product * vpl.area);
+        float area = vpl.area * float(stride) * (vpl.light >= 0 ? alone : 1.0);
+        float kernel = product / (PI * d2 + product * area);
         vec3 flux = vpl.flux;
 #if HAS_MEDIUM
         flux *= medium_transmittance(position_ws, w, sqrt(d2));
 #endif
         g.radiance += flux * kernel;
         // Light per direction, by the same bound but for the receiver's own cosine.
-        float arriving = luminance(flux) * cos_p / (PI * d2 + cos_p * vpl.area);
+        float arriving = luminance(flux) * cos_p / (PI * d2 + cos_p * area);
         g.direction += vec4(w, 1.0) * arriving;
     }
     g.radiance *= INV_PI * float(stride);
@@ -83,4 +86,4 @@ Gathered gather_some_vpls(vec3 position_ws, vec3 n, vec3 ng, int first, int stri
     return g;
 }
 
-Gathered gather_vpls(vec3 position_ws, vec3 n, vec3 ng) { return gather_some_vpls(position_ws, n, ng, 0, 1); }
+Gathered gather_vpls(vec3 position_ws, vec3 n, vec3 ng) { return gather_some_vpls(position_ws, n, ng, 0, 1, 1.0); }

@@ -173,7 +173,8 @@ vec3 rsm_ray(vec3 origin_ws, vec3 direction, vec3 ng, float u, out bool hit, out
     if (hit && max3(albedo) > 0.0) {
         int stride = max(vpl_count / RAY_VPLS, 1);
         vec3 at = origin_ws + direction * distance;
-        radiance += albedo * gather_some_vpls(at, normal_ws, normal_ws, int(u * float(stride)), stride).radiance;
+        radiance += albedo * gather_some_vpls(at, normal_ws, normal_ws, int(u * float(stride)), stride,
+                                              float(view.subframes)).radiance;
     }
 #endif
     return radiance;

@@ -1,0 +1,475 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Screen-space directional occlusion, Figure 4d of the paper.
+
+T. Ritschel, T. Grosch and H.-P. Seidel, "Approximating Dynamic Global Illumination in Image Space", I3D 2009. What the
+camera sees is all the geometry there is: each pixel gathers the light that the other pixels reflect, along rays through the
+depth buffer or over slices with a visibility bitmask. What lies outside the picture, or behind something, sends nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+
+from ..facts import Facts
+from ..frame import Frame
+from ..gpu_scene import world_source
+from ..gpu_types import LIGHT_SUN, LIGHT_WORLD
+from ..graph import Optional, Pass, Planned, Texture, Uniform
+from ..passes.ao import AOBlur, AOGeneration
+from ..passes.brdf_tables import BRDFTables
+from ..passes.direct_lighting import DirectLighting
+from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint, _screen, gather_size
+from ..passes.lights import LightList, ShadowMaps
+from ..passes.resolve import Resolve
+from ..passes.volumetric import Volumetric
+from ..settings import Settings
+
+
+def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
+    """Figure 4d, in order; each further bounce repeats the gather."""
+    bounces = []
+    for bounce in range(1, settings.bounces + 1):
+        last = bounce == settings.bounces
+        bounces += [
+            SentLight(bounce),
+            InterpolatedIndirect(f"ssdo.sent.{bounce}", f"ssdo.low.{bounce}"),
+            Smoothing(f"ssdo.sent.{bounce}", f"ssdo.low.{bounce}"),
+            IndirectLighting(f"ssdo.sent.{bounce}", f"ssdo.low.{bounce}",
+                             "indirect.diffuse" if last else f"ssdo.bounce.{bounce}"),
+        ]  # fmt: skip
+    return [
+        BRDFTables(),
+        LightList(),
+        ShadowMaps(),
+        GBuffer(),
+        TranslucentTint(),
+        GBufferMips(),
+        ScreenPlanes(),
+        AOGeneration() if settings.ssdo.occlusion == "MITTRING" else AOScan(),
+        AOBlur(),
+        InterpolatedIndirect("gbuffer.emission", "screen.low"),
+        Smoothing("gbuffer.emission", "screen.low"),
+        IndirectLighting("gbuffer.emission", "screen.low", "screen.light"),
+        DirectLighting() if settings.ssdo.shadows == "MAPS" or not settings.use_shadows else ScreenShadowLighting(),
+        *bounces,
+        ShadedScreen(),
+        NearnessPyramid(),
+        Reflections(),
+        TranslucentLayer(),
+        TranslucentBack(),
+        Refraction(),
+        Subsurface(),
+        Volumetric() if settings.ssdo.volumetric == "MARCH" else RadialBlur(),
+        Resolve(layers),
+    ]
+
+
+# What a gather takes, and what it makes (gather_lib.glsl, lighting_frag.glsl).
+_SENT = {"SENT_NOTHING": 0, "SENT_BOUNCE": 1, "SENT_EMISSION": 2}
+_TARGET = {"TARGET_INDIRECT": 0, "TARGET_BOUNCE": 1, "TARGET_SCREEN_LIGHT": 2}
+_LIGHT = "radiance a white Lambert surface would reflect, W/(m²·sr)"
+
+
+def _no_bounce(facts: Facts) -> str | None:
+    if not facts.settings.use_indirect_diffuse:
+        return "indirect diffuse is switched off"
+    return "no visible material is diffuse" if not facts.diffuse else None
+
+
+class ScreenPlanes(Pass):
+    """The depth buffer in a form in which planes and rays are linear."""
+
+    title = "SSDO Planes"
+    reads = ("gbuffer.depth", "gbuffer.normal")
+    writes = (
+        Texture("ssdo.planes", "ssdo_planes", "nearness of the visible surface (1/view depth; orthographic: −view depth) and "
+                "its slope per pixel of the surface's plane", "rgba32f", _screen),
+    )  # fmt: skip
+    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/ssdo/planes_frag.glsl"}}
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        frame.screen(planned, frame.program(planned))
+
+
+class SentLight(Pass):
+    """What each pixel sends on: direct light, and the bounce before this one."""
+
+    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/ssdo/sent_frag.glsl"}}
+
+    def __init__(self, bounce: int) -> None:
+        self.title = f"SSDO Sent Light {bounce}"
+        self.bounce = bounce
+        before = (Optional(f"ssdo.bounce.{bounce - 1}"),) if bounce > 1 else ()
+        self.reads = (
+            "direct.diffuse", "gbuffer.diffuse", Optional("gbuffer.specular"), Optional("gbuffer.lobe"),
+            Optional("brdf.average"), Optional("brdf.energy"), *before,
+        )  # fmt: skip
+        self.writes = (
+            Texture(f"ssdo.sent.{bounce}", "ssdo_sent", "radiance that leaves the surface, W/(m²·sr)", "rgba32f", _screen),
+        )
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return {} if self.bounce > 1 else {"HAS_LAST_BOUNCE": 0}
+
+    def absent(self, facts: Facts) -> str | None:
+        return _no_bounce(facts)
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        frame.screen(planned, frame.program(planned))
+
+
+class _Gather(Pass):
+    """Light from the screen: ``sent`` is the radiance that pixels send, or their emission, which comes with the world's light."""
+
+    uniforms = (
+        Uniform("ssdo_directions", "int", "directions (rays) or slices (bitmask) per pixel"),
+        Uniform("ssdo_steps", "int", "depth tests along each ray, or each side of a slice"),
+        Uniform("ssdo_radius", "float", "how far light is gathered from, world units; 0 = everywhere"),
+        Uniform("ssdo_thickness", "float", "thickness of what the screen shows, as a share of its distance from the receiver"),
+    )
+    sent = ""
+
+    @property
+    def from_sources(self) -> bool:
+        return not self.sent.startswith("ssdo.")
+
+    def absent(self, facts: Facts) -> str | None:
+        if not self.from_sources:
+            return _no_bounce(facts)
+        if not facts.screen_sources:
+            return "the world and emissive surfaces shine through shadow maps"
+        return None if facts.emissive_light or not facts.world_black else "the world is black and nothing emits"
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        emits = self.from_sources and facts.emissive_light
+        return {
+            **_SENT,
+            "SENT": _SENT["SENT_EMISSION" if emits else "SENT_NOTHING" if self.from_sources else "SENT_BOUNCE"],
+            "GATHER_WORLD": int(self.from_sources and not facts.world_black),
+            "GATHER_SCALE": facts.settings.gather_scale,
+            "SSDO_RAYS": int(facts.settings.ssdo.integrator == "RAYS"),
+        }
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        settings = planned.facts.settings.ssdo
+        per_direction = settings.steps * (1 if settings.integrator == "RAYS" else 2)
+        with _world(frame, planned, bool(self.defines(planned.facts)["GATHER_WORLD"])) as virtual:
+            program = frame.program(planned, virtual=virtual)
+            frame.set(
+                program,
+                ssdo_directions=max(1, settings.samples // per_direction),
+                ssdo_steps=settings.steps,
+                ssdo_radius=settings.radius,
+                ssdo_thickness=settings.thickness,
+            )
+            frame.screen(planned, program)
+
+
+class InterpolatedIndirect(_Gather):
+    """Light from the screen at one pixel per block."""
+
+    figure = "SSDO Interpolated Indirect Lighting Computation"
+    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/ssdo/gather_low_frag.glsl"}}
+
+    def __init__(self, sent: str, low: str) -> None:
+        self.sent = sent
+        self.title = f"{_title(sent)} (low resolution)"
+        self.reads = ("ssdo.planes", _read(sent), "gbuffer.low_depth", "gbuffer.low_normal", "gbuffer.low_pixel")
+        self.writes = (
+            Texture(f"{low}.raw", "raw_indirect", _LIGHT, "rgba32f", gather_size, scratch=True),
+            Texture(f"{low}.raw_direction", "raw_direction", "Σ luminance × direction, and Σ luminance, of what arrives",
+                    "rgba32f", gather_size, scratch=True),
+        )  # fmt: skip
+
+    def absent(self, facts: Facts) -> str | None:
+        return super().absent(facts) or (None if facts.settings.gather_scale > 1 else "every pixel gathers for itself")
+
+
+class Smoothing(Pass):
+    """Neighbouring blocks of one surface share their directions."""
+
+    figure = "Gaussian Blur"
+    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/ssdo/smooth_frag.glsl"}}
+
+    def __init__(self, sent: str, low: str) -> None:
+        self.title = f"{_title(sent)} (smoothing)"
+        self.reads = (f"{low}.raw", f"{low}.raw_direction", "gbuffer.low_depth", "gbuffer.low_normal", "gbuffer.low_pixel")
+        self.writes = (
+            Texture(low, "low_indirect", _LIGHT, "rgba32f", gather_size, scratch=True),
+            Texture(f"{low}.direction", "low_direction", "Σ luminance × direction, and Σ luminance, of what arrives", "rgba32f",
+                    gather_size, scratch=True),
+        )  # fmt: skip
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return {"GATHER_SCALE": facts.settings.gather_scale}
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        frame.screen(planned, frame.program(planned))
+
+
+class IndirectLighting(_Gather):
+    """Light from the screen for every pixel: interpolated where the low resolution has its surface, gathered where not."""
+
+    figure = "SSDO Lighting Computation"
+    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/ssdo/lighting_frag.glsl"}}
+
+    def __init__(self, sent: str, low: str, target: str) -> None:
+        self.sent = sent
+        self.title = _title(sent)
+        self.target = {"indirect.diffuse": "INDIRECT", "screen.light": "SCREEN_LIGHT"}.get(target, "BOUNCE")
+        self.reads = (
+            "ssdo.planes", _read(sent), "gbuffer.depth", "gbuffer.normal", Optional("gbuffer.low_depth"),
+            Optional("gbuffer.low_normal"), Optional("gbuffer.low_pixel"), Optional(low), Optional(f"{low}.direction"),
+        )  # fmt: skip
+        glsl = {"INDIRECT": "indirect_diffuse", "SCREEN_LIGHT": "screen_light", "BOUNCE": "last_bounce"}[self.target]
+        self.writes = (Texture(target, glsl, _LIGHT, "rgba32f", _screen),)
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return {**super().defines(facts), **_TARGET, "TARGET": _TARGET[f"TARGET_{self.target}"]}
+
+
+def _title(sent: str) -> str:
+    return f"SSDO Bounce {sent.rsplit('.', 1)[1]}" if sent.startswith("ssdo.") else "SSDO Directional Occlusion"
+
+
+def _read(sent: str) -> str | Optional:
+    return sent if sent.startswith("ssdo.") else Optional(sent)
+
+
+class AOScan(Pass):
+    """Ambient occlusion from the visibility bitmask, in the place of Mittring's."""
+
+    title = "SSDO AO Generation"
+    figure = "SSAO Generation"
+    reads = ("ssdo.planes", "gbuffer.depth", "gbuffer.normal")
+    writes = (
+        Texture("ao.raw", "ao_raw", "cosine-weighted share of directions free of occluders within the AO distance, twice",
+                "rg16f", _screen, scratch=True),
+    )  # fmt: skip
+    uniforms = (
+        Uniform("ao_slices", "int", "slices per pixel"),
+        Uniform("ao_steps", "int", "depth tests along each of a slice's two sides"),
+        Uniform("ao_distance", "float", "how far an occluder counts, m"),
+        Uniform("ao_thickness", "float", "thickness of what the screen shows, as a share of its distance from the receiver"),
+    )
+    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/ssdo/ao_scan_frag.glsl"}}
+
+    def absent(self, facts: Facts) -> str | None:
+        return None if facts.settings.use_ao else "ambient occlusion is switched off"
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        facts, program = planned.facts, frame.program(planned)
+        frame.set(
+            program,
+            ao_slices=max(1, facts.settings.ao.samples // 2),
+            ao_steps=facts.settings.ao.steps,
+            ao_distance=min(facts.ao_distance, 2.0 * facts.radius),
+            ao_thickness=facts.settings.ssdo.thickness,
+        )
+        frame.screen(planned, program)
+
+
+def _no_gloss(facts: Facts) -> str | None:
+    if not facts.settings.use_glossy:
+        return "glossy reflections are switched off"
+    return None if facts.glossy else "no visible material is glossy"
+
+
+class ShadedScreen(Pass):
+    """What reflections and refractions see of each pixel."""
+
+    title = "SSDO Shaded Screen"
+    reads = (
+        Optional("gbuffer.diffuse"), Optional("direct.diffuse"), Optional("indirect.diffuse"), Optional("direct.glossy"),
+    )  # fmt: skip
+    writes = (
+        Texture("ssdo.shaded", "ssdo_shaded", "radiance that leaves the surface, without its emission, W/(m²·sr)", "rgba32f",
+                _screen),
+    )  # fmt: skip
+    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/ssdo/shaded_frag.glsl"}}
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        frame.screen(planned, frame.program(planned))
+
+
+class NearnessPyramid(Pass):
+    """The nearest of 2 × 2, 4 × 4 … pixels."""
+
+    title = "SSDO Nearness Pyramid"
+    figure = "G-buffers Mipmap Generation"
+    reads = ("ssdo.planes",)
+    writes = (
+        Texture("ssdo.pyramid", "ssdo_pyramid", "nearness of the nearest surface below the texel", "r32f", _screen,
+                mips=lambda f: max(f.resolution).bit_length() - 1),
+    )  # fmt: skip
+    shaders = {"main": {"compute": "engines/ssdo/pyramid_comp.glsl"}}
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        pyramid = frame.resources["ssdo.pyramid"]
+        width, height = planned.facts.resolution
+        frame.bind(planned)
+        for level in range(max(width, height).bit_length()):
+            program = frame.program(planned, FIRST_LEVEL=int(level == 0))
+            if level:
+                pyramid.bind_to_image(0, read=True, write=False, level=level - 1)
+            pyramid.bind_to_image(min(level, 1), read=False, write=True, level=level)
+            program.run(-(-width // 8), -(-height // 8))
+            frame.gl.ctx.memory_barrier()
+            width, height = max(1, width // 2), max(1, height // 2)
+
+
+class Reflections(Pass):
+    """Glossy reflections of the screen."""
+
+    title = "SSDO Reflections"
+    reads = (
+        "ssdo.planes", "ssdo.pyramid", "ssdo.shaded", "gbuffer.depth", "gbuffer.normal", "gbuffer.specular", "gbuffer.lobe",
+        "brdf.energy", "brdf.average", Optional("gbuffer.emission", ("reflected.sources",)),
+    )  # fmt: skip
+    writes = (
+        Texture("indirect.glossy", "indirect_glossy", "radiance that the glossy lobe reflects of the screen, W/(m²·sr)",
+                "rgba32f", _screen),
+        Texture("reflected.sources", "reflected_sources", "radiance that it reflects of the world and of emissive pixels",
+                "rgba32f", _screen,
+                when=lambda f: None if _sources_traced(f) else "the world and emissive surfaces shine through shadow maps"),
+    )  # fmt: skip
+    uniforms = (
+        Uniform("ssdo_thickness", "float", "thickness of what the screen shows, as a share of its distance from the receiver"),
+    )
+    shaders = {"main": {"compute": "engines/ssdo/reflections_comp.glsl"}}
+
+    def absent(self, facts: Facts) -> str | None:
+        return _no_gloss(facts)
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return {
+            "TRACE_WORLD": int(facts.screen_sources and not facts.world_black),
+            "TRACE_EMISSION": int(facts.screen_sources and facts.emissive_light),
+        }
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        world = bool(self.defines(planned.facts)["TRACE_WORLD"])
+        with _world(frame, planned, world) as virtual:
+            program = frame.program(planned, virtual=virtual)
+            frame.set(program, ssdo_thickness=planned.facts.settings.ssdo.thickness)
+            frame.compute(planned, program, planned.facts.resolution)
+
+
+def _sources_traced(facts: Facts) -> bool:
+    return facts.screen_sources and (facts.emissive_light or not facts.world_black)
+
+
+@contextmanager
+def _world(frame: Frame, planned: Planned, wanted: bool) -> Iterator[dict[str, str]]:
+    """The world's shader for a program, and its images bound after the pass's own textures."""
+    units = len(planned.texture_reads())
+    if not wanted:
+        yield {"generated/world.glsl": "// no world\n"}
+        return
+    frame.gpu.bind_world_params()
+    frame.gpu.bind_images(frame.gpu.world, units)
+    yield {"generated/world.glsl": world_source(frame.gpu.world, units)}
+    frame.gpu.unbind_images(units, len(frame.gpu.world.images))
+
+
+class ScreenShadowLighting(DirectLighting):
+    """Direct light with shadows by screen-space rays: short ones over the shadow maps, or whole ones in their place."""
+
+    reads = (*DirectLighting.reads, "ssdo.planes")
+    uniforms = (
+        *DirectLighting.uniforms,
+        Uniform("ssdo_shadow_reach", "float", "length of the rays, world units"),
+        Uniform("ssdo_shadow_steps", "int", "depth tests along each"),
+        Uniform("ssdo_thickness", "float", "thickness of what the screen shows, as a share of its distance from the receiver"),
+    )
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return {**super().defines(facts), "HAS_SSDO_PLANES": 1}
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        facts = planned.facts
+        settings = facts.settings.ssdo
+        frame.set(
+            frame.program(planned),
+            ssdo_shadow_reach=(settings.contact if settings.shadows == "CONTACT" else 2.0) * facts.radius,
+            ssdo_shadow_steps=settings.steps,
+            ssdo_thickness=settings.thickness,
+        )
+        super().run(frame, planned)
+
+
+class Refraction(Pass):
+    """What is seen through refracting surfaces: a refracted ray per pixel, traced through the opaque G-buffer."""
+
+    title = "SSDO Refraction"
+    figure = "Lighting Computation"
+    reads = (
+        "ssdo.planes", "ssdo.pyramid", "ssdo.shaded", "gbuffer.transmission", "translucent.depth", "translucent.normal",
+        "translucent.color", "translucent.medium", "translucent.back_depth", "translucent.back_normal",
+        Optional("gbuffer.emission"),
+    )  # fmt: skip
+    writes = (
+        Texture("transmission.indirect", "transmission_indirect", "radiance through refracting surfaces, tinted; alpha 1 "
+                "where the ray found something", "rgba32f", _screen),
+    )  # fmt: skip
+    uniforms = Reflections.uniforms
+    shaders = {"main": {"compute": "engines/ssdo/refraction_comp.glsl"}}
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        program = frame.program(planned)
+        frame.set(program, ssdo_thickness=planned.facts.settings.ssdo.thickness)
+        frame.compute(planned, program, planned.facts.resolution)
+
+
+class Subsurface(Pass):
+    """Light that entered the surface near by."""
+
+    title = "SSDO Subsurface Scattering"
+    reads = (
+        "gbuffer.subsurface", "gbuffer.depth", "gbuffer.normal", "gbuffer.diffuse",
+        Optional("direct.diffuse", ("subsurface.direct",)), Optional("indirect.diffuse", ("subsurface.indirect",)),
+    )  # fmt: skip
+    writes = (
+        Texture("subsurface.direct", "subsurface_direct", "direct.diffuse after scattering below the surface; its share of "
+                "the surface's colour", "rgba32f", _screen),
+        Texture("subsurface.indirect", "subsurface_indirect", "the same of indirect.diffuse", "rgba32f", _screen),
+    )  # fmt: skip
+    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/ssdo/subsurface_frag.glsl"}}
+
+    def absent(self, facts: Facts) -> str | None:
+        return None if facts.settings.use_translucency else "translucency is switched off"
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        frame.screen(planned, frame.program(planned))
+
+
+class RadialBlur(Volumetric):
+    """The paper's cheap volumetric light: lights are visible from a pixel's air as far as the way to them on the screen is."""
+
+    title = "SSDO Volumetric Light by Radial Blur"
+    reads = (Optional("lights", ("volume.light",)), Optional("gbuffer.depth"))
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        # Without the camera's surfaces there is nothing in the way.
+        return {"RADIAL_BLUR": int(facts.visible), "VOXEL_VISIBILITY": 0, "HAS_LIGHT_VIEWS": 0, "HAS_SHADOW_DEPTH": 0, "HAS_RSM_DEPTH": 0}
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        if frame.subframe == 0:
+            notes = planned.facts.rig.notes
+            notes += [n for n in self.unseen(frame, planned.facts) if n not in notes]
+        super().run(frame, planned)
+
+    @staticmethod
+    def unseen(frame: Frame, facts: Facts) -> list[str]:
+        """A message for each lamp that is not in the picture, and so scatters no light here."""
+        out = []
+        clip_from_world = frame.view["clip_from_world"].T.astype("f8")
+        for light in frame.light_sample(bounce=False).lights:
+            parallel = light["kind"] in (LIGHT_SUN, LIGHT_WORLD)
+            x, y, _, w = clip_from_world @ np.append(-light["axis_ws"] if parallel else light["position_ws"], not parallel)
+            if w <= 0.0 or max(abs(x), abs(y)) > w:
+                out.append("a light is outside the picture: radial blur shows no beams of it; ssdo.volumetric MARCH does")
+        return out[:1]

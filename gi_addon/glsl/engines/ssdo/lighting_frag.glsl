@@ -1,0 +1,43 @@
+// Light from the screen per pixel: interpolated from the low resolution where that holds the pixel's surface, gathered afresh
+// where it does not.
+
+#include "engines/ssdo/gather_lib.glsl"
+#include "passes/gather_grid.glsl"
+#if HAS_LOW_INDIRECT
+#include "passes/interpolate.glsl"
+#endif
+
+void set_light(vec3 radiance)
+{
+#if TARGET == TARGET_INDIRECT
+    indirect_diffuse = vec4(radiance, 1.0);
+#elif TARGET == TARGET_BOUNCE
+    last_bounce = vec4(radiance, 1.0);
+#else
+    screen_light = vec4(radiance, 1.0);
+#endif
+}
+
+void main()
+{
+    ivec2 pixel = ivec2(gl_FragCoord.xy);
+    vec2 uv = gl_FragCoord.xy * view.inverse_resolution;
+    float depth = texelFetch(gbuf_depth, pixel, 0).r;
+    if (depth <= 0.0) {
+        set_light(vec3(0.0));
+        return;
+    }
+    vec3 position_ws = position_ws_from_depth(uv, depth);
+    vec4 normals = texelFetch(gbuf_normal, pixel, 0);
+    vec3 n = octahedral_decode(normals.xy);
+    vec3 ng = octahedral_decode(normals.zw);
+    vec3 radiance = vec3(0.0);
+    bool found = false;
+#if HAS_LOW_INDIRECT
+    found = interpolated_indirect(position_ws, n, ng, depth, radiance);
+#endif
+    if (!found) {
+        radiance = gather_screen(position_ws, n, ng, view_direction_ws(uv), hash_u32(uvec2(pixel + view.pixel_offset))).radiance;
+    }
+    set_light(radiance);
+}

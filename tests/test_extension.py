@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The extension's zip: built, validated, installed into a clean profile of the real Blender, used, taken out again."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+from conftest import ROOT
+from real_blender import need, run
+
+MODULE = "bl_ext.user_default.quartet"
+
+# A lit default cube, small.
+_SCENE = """
+scene = bpy.context.scene
+scene.render.engine = "QUARTET"
+scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 64, 36, 100
+scene.quartet.samples = 2
+def rendered(path):
+    scene.render.image_settings.file_format = "PNG"
+    scene.render.filepath = path
+    bpy.ops.render.render(write_still=True)
+    pixels = list(bpy.data.images.load(path).pixels)
+    return [min(pixels[0::4]), max(pixels[0::4])]
+"""
+
+_INSTALL = """
+bpy.context.preferences.view.show_splash = False
+bpy.ops.extensions.package_install_files(filepath={zip!r}, repo="user_default", enable_on_install=True)
+import importlib
+root = importlib.import_module({module!r})
+""" + _SCENE + """
+out = dict(span=rendered({picture!r}), where=root.__file__)
+import moderngl
+out["moderngl"] = moderngl.__file__
+status = importlib.import_module({module!r} + ".host.status")
+preferences = importlib.import_module({module!r} + ".host.preferences")
+class Layout:
+    def __init__(self): self.texts = []
+    def label(self, text="", **_): self.texts.append(text)
+    def operator(self, name, **_): self.texts.append(name)
+    def row(self): return self
+    box = row
+layout = Layout()
+preferences.draw(layout)
+out["preferences"] = layout.texts
+out["page"] = {module!r} in bpy.context.preferences.addons
+window = bpy.context.window_manager.quartet
+window.reference_samples, window.compare_percentage = 2, 50
+out["compared"] = list(bpy.ops.quartet.compare())
+bpy.ops.wm.save_userpref()
+report(**out)
+"""
+
+# A second start finds it installed; disabling must leave nothing.
+_AGAIN = _SCENE + """
+import threading
+out = dict(span=rendered({picture!r}))
+bpy.ops.preferences.addon_disable(module={module!r})
+out["classes"] = [n for n in dir(bpy.types) if n.startswith(("QUARTET", "Quartet"))]
+out["operators"] = [n for n in dir(bpy.ops.quartet)]
+out["panels"] = [p.__name__ for p in bpy.types.Panel.__subclasses__() if "QUARTET" in getattr(p, "COMPAT_ENGINES", ())]
+out["properties"] = [hasattr(bpy.types.Scene, "quartet"), hasattr(bpy.types.WindowManager, "quartet")]
+out["engine"] = any(getattr(e, "bl_idname", "") == "QUARTET" and e.is_registered
+                    for e in bpy.types.RenderEngine.__subclasses__())
+out["threads"] = [t.name for t in threading.enumerate() if "Quartet" in t.name]
+report(**out)
+"""
+
+
+@pytest.fixture(scope="module")
+def zips(tmp_path_factory) -> Path:
+    """The folder of freshly built zips."""
+    pytest.importorskip("bpy")
+    folder = tmp_path_factory.mktemp("dist")
+    done = subprocess.run(
+        [sys.executable, str(ROOT / "scripts" / "build_extension"), "--output", str(folder)], capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder
+
+
+@pytest.mark.blender
+@pytest.mark.parametrize(("platform", "tag"), [("linux_x64", "manylinux"), ("windows_x64", "win_amd64")])
+def test_a_zip_has_the_wheels_of_its_platform_for_every_blender(zips, platform, tag):
+    """moderngl and glcontext for Python 3.11, 3.13 and 3.14, for that platform only; the package, its shaders, no command
+    line. Blender's own validator has accepted it: the builder runs it."""
+    (path,) = zips.glob(f"*{platform}.zip")
+    names = zipfile.ZipFile(path).namelist()
+    wheels = [n for n in names if n.endswith(".whl")]
+    assert len(wheels) == 6 and all(tag in n for n in wheels)
+    for package in ("moderngl", "glcontext"):
+        for python in ("cp311", "cp313", "cp314"):
+            assert any(f"{package}-" in n and f"-{python}-" in n for n in wheels), f"{package} for {python}"
+    assert {"blender_manifest.toml", "__init__.py", "LICENSE", "host/engine.py"} <= set(names)
+    assert sum(n.endswith(".glsl") for n in names) == len(list((ROOT / "gi_addon" / "glsl").rglob("*.glsl")))
+    assert not any("cli" in n or "__pycache__" in n for n in names)
+
+
+@pytest.mark.blender
+@pytest.mark.realblender
+def test_installed_from_the_zip_it_renders_and_leaves_nothing_behind(zips, tmp_path):
+    need()
+    (path,) = zips.glob("*linux_x64.zip")
+    profile = tmp_path / "profile"
+    profile.mkdir()
+    values = {"{zip!r}": repr(str(path)), "{module!r}": repr(MODULE), "{picture!r}": repr(str(tmp_path / "out.png"))}
+
+    def filled(script: str) -> str:
+        for key, value in values.items():
+            script = script.replace(key, value)
+        return script
+
+    first = run(filled(_INSTALL), tmp_path, "-b", profile=profile)
+    assert first["where"].startswith(str(profile)) and first["moderngl"].startswith(str(profile))
+    assert first["span"][1] > first["span"][0] + 0.1
+    assert any("OpenGL driver: " in text and "not started" not in text for text in first["preferences"])
+    assert first["page"] and first["compared"] == ["FINISHED"]
+    second = run(filled(_AGAIN), tmp_path, "-b", profile=profile)
+    assert second["span"] == first["span"]
+    assert second["properties"] == [False, False] and not second["engine"]
+    assert not second["classes"] and not second["operators"] and not second["panels"] and not second["threads"]
+
+
+@pytest.mark.realblender
+def test_an_old_driver_gets_a_message_where_the_user_looks(tmp_path):
+    """OpenGL 4.2: the render fails with the reason, which the panel shows too, and nothing crashes."""
+    answer = run(
+        "import gi_addon\ngi_addon.register()\n" + _SCENE + """
+from gi_addon.host import status
+try:
+    bpy.ops.render.render()
+    said = ""
+except RuntimeError as error:
+    said = str(error)
+report(said=said, panel=status.problem)
+gi_addon.unregister()
+""",
+        tmp_path, "-b", MESA_GL_VERSION_OVERRIDE="4.2",
+    )  # fmt: skip
+    for text in answer.values():
+        assert "OpenGL 4.3" in text and "4.2" in text

@@ -1,0 +1,481 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""SSDO against closed forms, and the stability tests in their screen-space form. f_s = 1: nothing here is fitted."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from conftest import make
+from gpu import evaluate
+
+from gi_addon.compare import scenes
+from gi_addon.renderer import inspect
+from gi_addon.settings import Settings, walk
+
+INTEGRATORS = ("RAYS", "BITMASK")
+
+
+def ssdo(scene, *outputs, **settings):
+    return make(scene, *outputs, technique="SSDO", **settings)
+
+
+# --- closed forms -------------------------------------------------------------------------------------------------------
+
+
+def seen_share(camera, points: np.ndarray) -> float:
+    """Share of ``points`` (N, 3) that lie inside the picture."""
+    clip = np.c_[points, np.ones(len(points))] @ np.linalg.inv(camera.world_from_view).T @ camera.clip_from_view.T
+    return float(((np.abs(clip[:, :2]) <= clip[:, 3:]).all(axis=1) & (clip[:, 3] > 0)).mean())
+
+
+def sphere_hits(lamp, count: int = 200_000) -> np.ndarray:
+    """Where the light of a lamp in the unit sphere lands, each point with the same flux."""
+    d = np.random.default_rng(0).normal(size=(count, 3))
+    d /= np.linalg.norm(d, axis=1, keepdims=True)
+    lamp = np.asarray(lamp, "f8")
+    along = d @ lamp
+    return lamp + d * (np.sqrt(along**2 - lamp @ lamp + 1.0) - along)[:, None]
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+@pytest.mark.parametrize("lamp", [(0.0, 0.0, 0.0), (0.0, 0.8, 0.0)])
+def test_sphere_one_bounce_is_the_share_of_lit_surface_on_screen(gl, integrator, lamp):
+    """Stability test 1. In a sphere every patch lights every point alike, 1/(4πR²) per flux: what the screen shows of the
+    flux is what a point gets of E₁ = ρΦ/(4πR²). g = share ± .03."""
+    scene = scenes.integrating_sphere(albedo=0.5, power=100.0, light=lamp)
+    image = ssdo(scene, "Diffuse Indirect", samples=4, ssdo__integrator=integrator).passes["Diffuse Indirect"][..., 0]
+    g = image.mean() * np.pi / (0.5 * 100.0 / (4 * np.pi))
+    assert g == pytest.approx(seen_share(scene.camera, sphere_hits(lamp)), abs=0.03)
+
+
+def polygon_irradiance(points: np.ndarray, normal, polygon: np.ndarray) -> np.ndarray:
+    """E/L (N,) at points (N, 3) from a Lambertian polygon (K, 3): ½ Σ Θ_i Γ_i·n over its edges (J. Lambert, 1760)."""
+    v = polygon[None] - points[:, None]
+    v /= np.linalg.norm(v, axis=-1, keepdims=True)
+    w = np.roll(v, -1, axis=1)
+    cross = np.cross(v, w)
+    length = np.linalg.norm(cross, axis=-1)
+    angle = np.arctan2(length, (v * w).sum(-1))
+    return np.abs(0.5 * (angle * (cross @ np.asarray(normal, "f8")) / np.maximum(length, 1e-12)).sum(-1))
+
+
+FLOOR = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], "f8")
+
+
+def corner(camera):
+    """A floor under a sun that passes along a wall: the floor's light on the wall is all the wall gets."""
+    b = scenes.SceneBuilder()
+    b.quads(FLOOR[None], scenes.diffuse((0.8,) * 3))
+    b.quads(np.array([[[-1, 1, 0], [1, 1, 0], [1, 1, 1], [-1, 1, 1]]]), scenes.diffuse((0.8,) * 3))
+    b.light(scenes.sun_light((0, 0, -1), 5.0))
+    return b.build(camera)
+
+
+def wall_points(camera, shape) -> tuple[np.ndarray, np.ndarray]:
+    """Pixels (H, W) that show the wall, and where on it (N, 3)."""
+    height, width = shape
+    x, y = np.meshgrid((np.arange(width) + 0.5) / width * 2 - 1, (np.arange(height) + 0.5) / height * 2 - 1)
+    inverse = camera.world_from_view @ np.linalg.inv(camera.clip_from_view)
+    near, far = (np.stack([x, y, np.full_like(x, z), np.ones_like(x)], -1) @ inverse.T for z in (-1.0, 1.0))
+    near, far = near[..., :3] / near[..., 3:], far[..., :3] / far[..., 3:]
+    p = near + (far - near) * ((1.0 - near[..., 1]) / (far - near)[..., 1])[..., None]
+    edge = 0.04  # pixels wholly on the wall
+    on = (np.abs(p[..., 0]) < 1 - edge) & (p[..., 2] > edge) & (p[..., 2] < 1 - edge)
+    return on, p[on]
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_a_lit_floor_lights_a_wall_by_its_form_factor(gl, integrator):
+    """E = ρ E_sun F with Lambert's polygon formula, both surfaces on the screen: the mean to 2 %, three heights of the wall to
+    5 %, single pixels to 10 % in the mean."""
+    camera = scenes.perspective((0.3, -3.2, 1.8), (0, 0.3, 0.3), 0.9)
+    image = ssdo(corner(camera), "Diffuse Indirect", samples=8, gather_scale=1,
+                 ssdo__integrator=integrator).passes["Diffuse Indirect"][..., 0]  # fmt: skip
+    on, points = wall_points(camera, image.shape)
+    expected = 0.8 * 5.0 / np.pi * polygon_irradiance(points, (0, -1, 0), FLOOR) / np.pi
+    got = image[on]
+    assert got.mean() == pytest.approx(expected.mean(), rel=0.02)
+    for low, high in ((0.0, 0.3), (0.3, 0.6), (0.6, 1.0)):
+        part = (points[:, 2] >= low) & (points[:, 2] < high)
+        assert got[part].mean() == pytest.approx(expected[part].mean(), rel=0.05), (low, high)
+    assert np.abs(got / expected - 1).mean() < 0.1
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_brightness_does_not_change_with_zoom_view_or_size(gl, integrator):
+    """± 3 %: the wall's light seen from near and far, through wide and narrow lenses, in pictures of three sizes, and by
+    an orthographic camera; everything stays on the screen. Gathered at every pixel: blocks of four interpolated over a wall
+    of a few blocks are another error, 4 %."""
+    views = [
+        (scenes.perspective((0, -3, 2), (0, 0, 0.3), 1.0), (96, 54)),
+        (scenes.perspective((0, -3, 2), (0, 0, 0.3), 1.0), (48, 27)),
+        (scenes.perspective((0, -3, 2), (0, 0, 0.3), 1.0), (160, 90)),
+        (scenes.perspective((0, -3, 2), (0, 0, 0.3), 1.6), (96, 54)),
+        (scenes.perspective((0, -12, 8), (0, 0, 0.3), 0.3), (96, 54)),
+        (scenes.orthographic((0, -3, 2), (0, 0, 0.3), 3.4), (96, 54)),
+    ]
+    gains = []
+    for camera, size in views:
+        p = ssdo(corner(camera), "Diffuse Indirect", resolution=size, samples=8, gather_scale=1,
+                 ssdo__integrator=integrator).passes  # fmt: skip
+        on, points = wall_points(camera, size[::-1])
+        expected = 0.8 * 5.0 / np.pi * polygon_irradiance(points, (0, -1, 0), FLOOR) / np.pi
+        gains.append(p["Diffuse Indirect"][..., 0][on].sum() / expected.sum())
+    assert np.abs(np.array(gains) - 1).max() <= 0.03, gains
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_the_low_resolution_gather_changes_little(gl, integrator):
+    """Smoothed and interpolated over blocks of 4 pixels: the mean within 3 %, and each pixel within 8 % in the mean."""
+    scene = corner(scenes.perspective((0.3, -3.2, 1.8), (0, 0.3, 0.3), 0.9))
+    full, low = (
+        ssdo(scene, "Diffuse Indirect", samples=8, resolution=(160, 90), gather_scale=s, ssdo__integrator=integrator,
+             ssdo__samples=256).passes["Diffuse Indirect"]
+        for s in (1, 4)
+    )  # fmt: skip
+    assert low.mean() == pytest.approx(full.mean(), rel=0.03)
+    assert np.abs(low - full).mean() / full.mean() < 0.08
+
+
+@pytest.mark.parametrize("bounces", [2, 4])
+def test_more_bounces_follow_the_geometric_series(gl, bounces):
+    """Stability test 2 in its screen-space form: each bounce brings ρ × (share of the sphere on screen) of the one before."""
+    scene = scenes.integrating_sphere(albedo=0.5, power=100.0)
+    one, more = (
+        ssdo(scene, "Diffuse Indirect", samples=4, bounces=n).passes["Diffuse Indirect"].mean() for n in (1, bounces)
+    )
+    ratio = 0.5 * seen_share(scene.camera, sphere_hits((0, 0, 0)))
+    assert more / one == pytest.approx(sum(ratio**k for k in range(bounces)), abs=0.025)
+
+
+def test_a_flat_plane_never_lights_itself(gl):
+    scene = scenes.plane_scene(scenes.point_light((0, 0, 1), 100.0))
+    for integrator in INTEGRATORS:
+        image = ssdo(scene, "Diffuse Indirect", samples=2, ssdo__integrator=integrator).passes["Diffuse Indirect"]
+        assert image.max() == 0.0
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_the_world_arrives_through_open_directions(gl, integrator):
+    """Directional occlusion alone: a plane under a world of radiance L has E/π = L; at the foot of an endless wall half."""
+    b = scenes.SceneBuilder()
+    b.quads(FLOOR[None] * 3, scenes.diffuse((0.8,) * 3))
+    scene = b.build(scenes.perspective((0, -3, 2), (0, 0, 0), 0.8), scenes.world((0.5, 0.6, 0.7)))
+    p = ssdo(scene, "Diffuse Direct", "Depth", samples=4, ssdo__integrator=integrator, ssdo__sources="SCREEN").passes
+    seen = p["Depth"][..., 0] < 1e9
+    assert p["Diffuse Direct"][seen].mean(axis=0) == pytest.approx(np.array([0.5, 0.6, 0.7]), rel=0.01)
+    b = scenes.SceneBuilder()
+    b.quads(FLOOR[None] * 3, scenes.diffuse((0.5,) * 3))
+    b.quads(np.array([[[-30, 0, 0], [30, 0, 0], [30, 0, 30], [-30, 0, 30]]]), scenes.diffuse((0.5,) * 3))
+    scene = b.build(scenes.orthographic((0, -0.6, 0.6), (0, 0, 0), 0.5), scenes.world((1, 1, 1)))
+    p = ssdo(scene, "Diffuse Direct", "Normal", samples=8, ssdo__integrator=integrator, ssdo__sources="SCREEN",
+             gather_scale=1).passes  # fmt: skip
+    floor = (p["Normal"][..., 2] > 0.999) & (p["Diffuse Direct"][..., 0] > 0)
+    near = floor & (np.roll(~floor, -2, axis=0))  # two pixels below the wall's foot
+    assert p["Diffuse Direct"][near].mean() == pytest.approx(0.5, abs=0.06)
+
+
+def test_emissive_pixels_light_by_their_form_factor(gl):
+    """The floor emits: E on the wall is L × Lambert's polygon formula, 3 %; and it counts as direct light, as in Cycles."""
+    camera = scenes.perspective((0.3, -3.2, 1.8), (0, 0.3, 0.3), 0.9)
+    scene = corner(camera)
+    scene.lights = []
+    scene.materials[0] = scenes.emissive((1, 1, 1), 2.0)
+    image = ssdo(scene, "Diffuse Direct", samples=16, ssdo__sources="SCREEN").passes["Diffuse Direct"][..., 0]
+    on, points = wall_points(camera, image.shape)
+    expected = 2.0 * polygon_irradiance(points, (0, -1, 0), FLOOR) / np.pi
+    assert image[on].mean() == pytest.approx(expected.mean(), rel=0.03)
+
+
+# --- the kernels --------------------------------------------------------------------------------------------------------
+
+
+def test_ray_directions_fill_the_hemisphere_as_their_density_says(gl):
+    """Kernel histogram: with pdf cosθ/π, sin²θ is uniform and so is the azimuth; no elevation is left out."""
+    code = "vec4 evaluate(vec4 x) { return vec4(warp_cosine_hemisphere(sobol_2d(uint(x.x), 40u)), 0.0); }"
+    index = np.zeros((4096, 4))
+    index[:, 0] = np.arange(4096)
+    d = gl(evaluate, code, index, "lib/sequence_lib.glsl")
+    for values in (d[:, 0] ** 2 + d[:, 1] ** 2, np.arctan2(d[:, 1], d[:, 0]) / (2 * np.pi) + 0.5):
+        counts, _ = np.histogram(values, 16, (0.0, 1.0))
+        assert np.abs(counts / 256 - 1).max() < 0.05
+
+
+def test_slices_weigh_one_in_the_mean_and_their_sectors_tile(gl):
+    """For any normal the mean of |n'| ∫ cos(θ − γ)|sin θ| dθ over slices is 1; and neighbouring intervals share no sector."""
+    code = """
+    vec4 evaluate(vec4 x)
+    {
+        vec3 n = vec3(sin(x.x), 0.0, cos(x.x));
+        Slice slice = make_slice(n, vec3(0, 0, 1), vec3(cos(x.y), sin(x.y), 0.0), x.z);
+        uint a = sectors_between(slice, -4.0, x.w);
+        uint b = sectors_between(slice, x.w, 4.0);
+        return vec4(slice.weight, float(bitCount(a & b)), float(bitCount(a | b)),
+                    slice_middle(slice, 16) - slice.gamma);
+    }
+    """
+    rng = np.random.default_rng(1)
+    tilts = np.repeat([0.0, 0.4, 0.9, 1.4], 512)
+    phi = np.tile(np.pi * (np.arange(512) + 0.5) / 512, 4)
+    x = np.c_[tilts, phi, rng.random(2048) * 0.99, rng.uniform(-1.5, 1.5, 2048)]
+    out = gl(evaluate, code, x, "engines/ssdo/slice_lib.glsl")
+    for k in range(4):
+        assert out[512 * k : 512 * (k + 1), 0].mean() == pytest.approx(1.0, abs=0.01)
+    assert out[:, 1].max() == 0 and out[:, 2].min() == 32
+    assert np.abs(out[:, 3]).max() < np.pi / 2
+
+
+# --- stability ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_light_is_linear_in_power(gl, integrator):
+    """Stability test 17: power × k scales every light pass by k, 1e-3; two lights are the sum of each."""
+    names = ("Combined", "Diffuse Direct", "Diffuse Indirect")
+    settings = {"samples": 2, "ssdo__integrator": integrator, "resolution": (64, 36)}
+    a, b = (ssdo(scenes.cornell(power=p), *names, **settings).passes for p in (60.0, 60e3))
+    for name in names:
+        assert np.abs(a[name][..., :3] * 1e3 - b[name][..., :3]).max() <= 1e-3 * b[name][..., :3].max(), name
+    lights = [scenes.point_light((-0.4, 0, 1.5), 40.0), scenes.spot_light((0.3, 0, 1.9), (0, 0, 0), 90.0, 1.4, 0.3)]
+
+    def box(*chosen):
+        scene = scenes.cornell(blocks=False)
+        scene.lights = list(chosen)
+        return ssdo(scene, "Diffuse Indirect", **settings).passes["Diffuse Indirect"]
+
+    total = box(lights[0]) + box(lights[1])
+    assert np.abs(box(*lights) - total).max() <= 1e-3 * total.max()
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_the_same_input_gives_the_same_picture_bit_for_bit(gl, integrator):
+    """Stability test 16."""
+    scene = scenes.cornell()
+    a, b = (ssdo(scene, "Combined", samples=2, bounces=2, ssdo__integrator=integrator).passes["Combined"] for _ in range(2))
+    assert np.array_equal(a, b)
+
+
+def test_a_margin_brings_in_what_lies_just_outside(gl):
+    """Stability test 9: the lit floor leaves the picture, and half of its light with it; with a margin it still counts."""
+    whole = scenes.perspective((0, -4, 1.5), (0, 1, 0.5), 1.2)
+    near = scenes.perspective((0, -4, 1.5), (0, 1, 0.9), 0.34)  # the wall's upper part
+
+    def wall(camera, **settings):
+        p = ssdo(corner(camera), "Diffuse Indirect", samples=8, **settings).passes["Diffuse Indirect"][..., 0]
+        on, points = wall_points(camera, p.shape)
+        inside = (np.abs(points[:, 0]) < 0.5) & (points[:, 2] > 0.75)
+        return p[on][inside].mean()
+
+    reference = wall(whole)
+    without, with_margin = wall(near), wall(near, ssdo__margin=1.0)
+    assert without < 0.6 * reference
+    assert with_margin == pytest.approx(reference, rel=0.1)
+
+
+def test_a_margin_leaves_the_picture_where_it_was(gl):
+    """Direct light and depth are the same with and without one, to the rounding of a longer projection."""
+    scene = scenes.cornell()
+    a, b = (ssdo(scene, "Diffuse Direct", "Depth", samples=2, ssdo__margin=m).passes for m in (0.0, 0.2))
+    assert a["Depth"].shape == b["Depth"].shape
+    assert np.median(np.abs(a["Depth"] / b["Depth"] - 1)) < 1e-5
+    assert np.mean(np.abs(a["Diffuse Direct"] - b["Diffuse Direct"])) < 0.01 * a["Diffuse Direct"].mean()
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1e3])
+def test_a_scene_in_millimetres_or_kilometres_looks_alike(gl, scale):
+    """Stability test 12: lengths × s and power × s² leave radiance alone; relMSE ≤ 1e-4."""
+    def box(s):
+        scene = scenes.cornell(power=60.0 * s * s)
+        scene.instances.matrix = np.diag([s, s, s, 1.0]) @ scene.instances.matrix
+        for light in scene.lights:
+            light.matrix = light.matrix.copy()
+            light.matrix[:3, 3] *= s
+        camera = scene.camera
+        camera.world_from_view[:3, 3] *= s
+        near, far = camera.clip_start * s, camera.clip_end * s
+        camera.clip_from_view[2] = [0, 0, -(far + near) / (far - near), -2 * far * near / (far - near)]
+        camera.clip_start, camera.clip_end = near, far
+        scene.world.ao_distance *= s
+        return ssdo(scene, "Combined", samples=2, resolution=(64, 36)).passes["Combined"][..., :3]
+
+    one, other = box(1.0), box(scale)
+    assert np.mean((other - one) ** 2 / (one**2 + (0.1 * one.mean()) ** 2)) <= 1e-4
+
+
+def test_what_is_switched_off_does_not_run(gl):
+    """Off costs nothing: without indirect light no pass of the technique is left."""
+    settings = Settings()
+    settings.set("technique", "SSDO")
+    settings.set("use_indirect_diffuse", False)
+    plan = inspect(scenes.cornell(), settings, resolution=(64, 36))
+    assert not [p.title for p in plan.run if p.title.startswith("SSDO")]
+    assert not [name for name in plan.resources if name.startswith("ssdo")]
+
+
+OTHER = {
+    "ssdo.samples": 64, "ssdo.steps": 4, "ssdo.integrator": "BITMASK", "ssdo.radius": 0.2, "ssdo.thickness": 0.02,
+    "ssdo.margin": 0.25, "ssdo.sources": "SCREEN", "ssdo.occlusion": "MITTRING", "ssdo.shadows": "SCREEN",
+    "ssdo.contact": 0.5, "ssdo.volumetric": "RADIAL",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("path", [p for p, _, _ in walk() if p.startswith("ssdo.")])
+def test_every_setting_of_the_technique_changes_the_picture(gl, path):
+    scene = scenes.cornell()
+    scene.world = scenes.world((0.3, 0.4, 0.5))
+    on = {"volume__density": 0.05} if path == "ssdo.volumetric" else {"ssdo__shadows": "CONTACT"} if "contact" in path else {}
+    a, b = (
+        ssdo(scene, "Combined", "Ambient Occlusion", samples=2, resolution=(64, 36), **on, **s).passes
+        for s in ({}, {path.replace(".", "__"): OTHER[path]})
+    )
+    assert any(not np.array_equal(a[name], b[name]) for name in a)
+
+
+# --- effects ------------------------------------------------------------------------------------------------------------
+
+
+def mirror(roughness: float, **settings):
+    """A mirror floor before a wall of even brightness: (reflected radiance, the wall's own), at pixels that reflect it."""
+    b = scenes.SceneBuilder()
+    b.quads(FLOOR[None], scenes.principled(Metallic=1.0, Roughness=roughness, Base_Color=(1, 1, 1, 1)))
+    b.quads(np.array([[[-1, 1, 0], [1, 1, 0], [1, 1, 1], [-1, 1, 1]]]), scenes.diffuse((0.8,) * 3))
+    b.light(scenes.sun_light((0, 1, -1), 5.0))
+    scene = b.build(scenes.perspective((0, -3.2, 1.0), (0, 0.3, 0.4), 0.9))
+    p = ssdo(scene, "Glossy Indirect", "Glossy Color", "Normal", samples=4, use_indirect_diffuse=False, **settings).passes
+    lit = (p["Glossy Indirect"] * p["Glossy Color"])[..., 0]
+    height, width = lit.shape
+    inner = lit[height // 8 : height // 3, int(width * 0.4) : int(width * 0.6)]
+    return inner, 0.8 * 5.0 / np.sqrt(2.0) / np.pi
+
+
+def test_a_mirror_shows_the_wall_behind_it_as_bright_as_it_is(gl):
+    """What a perfect mirror reflects is the wall's own radiance, ρ E/π, at every pixel that reflects it."""
+    seen, wall = mirror(0.0)
+    assert seen == pytest.approx(np.full_like(seen, wall), rel=0.01)
+
+
+def test_a_rough_mirror_reflects_less_of_a_small_wall(gl):
+    """A wide lobe looks past the wall: dimmer, not darker than half; and off is off."""
+    seen, wall = mirror(0.35)
+    assert 0.4 * wall < seen.mean() < 0.95 * wall
+    seen, _ = mirror(0.0, use_glossy=False)
+    assert seen.max() == 0.0
+
+
+def test_the_world_is_in_the_mirror_where_rays_find_nothing(gl):
+    """With the world taken from the screen, a mirror under it shows its radiance: Glossy Direct, as in Cycles."""
+    b = scenes.SceneBuilder()
+    b.quads(FLOOR[None] * 3, scenes.principled(Metallic=1.0, Roughness=0.0, Base_Color=(1, 1, 1, 1)))
+    scene = b.build(scenes.perspective((0, -3, 2), (0, 0, 0), 0.8), scenes.world((0.5, 0.6, 0.7)))
+    p = ssdo(scene, "Glossy Direct", "Glossy Color", "Depth", samples=1, ssdo__sources="SCREEN").passes
+    seen = p["Depth"][..., 0] < 1e9
+    light = (p["Glossy Direct"] * p["Glossy Color"])[seen]
+    assert light.mean(axis=0) == pytest.approx(np.array([0.5, 0.6, 0.7]), rel=0.01)
+
+
+def occluder(**settings):
+    """A slab above a floor under a sun: Shadow (H, W) and the scene's settings."""
+    b = scenes.SceneBuilder()
+    b.quads(FLOOR[None], scenes.diffuse((0.8,) * 3))
+    b.quads(scenes.box_quads((-0.3, -0.3, 0.0), (0.3, 0.3, 0.5)), scenes.diffuse((0.8,) * 3))
+    b.light(scenes.sun_light((0.7, 0.3, -1), 5.0))
+    return ssdo(b.build(scenes.perspective((0, -3.2, 2.4), (0, 0, 0.2), 0.8)), "Diffuse Direct", samples=4, **settings)
+
+
+def test_screen_rays_throw_the_shadow_that_the_map_throws(gl):
+    """An occluder wholly on the screen: the two agree but for its rim and the side that the camera does not see."""
+    by_map, by_rays = (occluder(ssdo__shadows=s).passes["Diffuse Direct"][..., 0] for s in ("MAPS", "SCREEN"))
+    dark = by_map < 0.1 * by_map.max()
+    agree = (by_rays < 0.5 * by_map.max()) == (by_map < 0.5 * by_map.max())
+    assert dark.sum() > 50 and agree.mean() > 0.95
+
+
+def test_screen_shadows_need_no_shadow_map_and_contacts_mend_a_coarse_one(gl):
+    """Of a map of 64 texels short rays over it leave less error against one of 1024; they only ever darken."""
+    assert "Shadow Maps" not in [p.title for p in occluder(ssdo__shadows="SCREEN").plan.run]
+    b = scenes.SceneBuilder()
+    b.quads(FLOOR[None] * 4, scenes.diffuse((0.8,) * 3))
+    b.quads(scenes.box_quads((-0.03, -0.03, 0.0), (0.03, 0.03, 0.3)), scenes.diffuse((0.8,) * 3))  # half a texel thick
+    b.light(scenes.sun_light((0.7, 0.3, -1), 5.0))
+    scene = b.build(scenes.perspective((0, -1.2, 0.9), (0, 0, 0.1), 0.7))
+    coarse = {"shadows__resolution": 64, "ssdo__contact": 0.1, "samples": 4}
+    fine = ssdo(scene, "Diffuse Direct", samples=4).passes["Diffuse Direct"]
+    maps, contacts = (ssdo(scene, "Diffuse Direct", ssdo__shadows=s, **coarse).passes["Diffuse Direct"]
+                      for s in ("MAPS", "CONTACT"))  # fmt: skip
+    assert (contacts <= maps + 1e-6).all()
+    assert np.square(contacts - fine).mean() < 0.9 * np.square(maps - fine).mean()
+
+
+def glass(ior: float, **settings):
+    """A pane of glass before a wall whose right half is dark."""
+    b = scenes.SceneBuilder()
+    for x0, x1, color in ((-3, 0, 0.8), (0, 3, 0.0)):
+        b.quads(np.array([[[x0, 1, -2], [x1, 1, -2], [x1, 1, 2], [x0, 1, 2]]]), scenes.diffuse((color,) * 3))
+    b.quads(scenes.box_quads((-1, -0.5, -0.6), (1, 0.0, 0.6)),
+            scenes.principled(Transmission_Weight=1.0, Roughness=0.0, IOR=ior, Base_Color=(1, 1, 1, 1)))  # fmt: skip
+    b.light(scenes.sun_light((0, 1, -3), 5.0))  # steep: the pane's own shadow falls below the picture
+    scene = b.build(scenes.perspective((-1.2, -3.5, 0), (-0.1, 0, 0), 0.55))
+    return ssdo(scene, "Transmission Indirect", "Transmission Color", samples=1, use_indirect_diffuse=False, resolution=(160, 90),
+                **settings).passes  # fmt: skip
+
+
+def test_a_pane_moves_what_is_behind_it_by_snells_law(gl):
+    """A plane-parallel pane of depth D shifts the ray sideways by D (tan θ − tan θ'), sin θ = n sin θ': so the wall's edge
+    moves by that much of a pixel count in the picture; with n = 1 not at all."""
+    def edge(ior):
+        p = glass(ior)
+        row = (p["Transmission Indirect"] * p["Transmission Color"])[45, :, 0]
+        lit = np.flatnonzero(row > 0.5 * row.max())
+        return lit.max()
+
+    eye, wall = np.array([-1.2, -3.5]), np.array([0.0, 1.0])
+    # The ray that reaches the edge enters the pane's face at y = −0.5; n = 1.5.
+    tan = (wall[0] - eye[0]) / (wall[1] - eye[1])
+    for _ in range(50):
+        sin = tan / np.hypot(1.0, tan) / 1.5
+        tan = (wall[0] - eye[0] - 0.5 * sin / np.sqrt(1 - sin * sin)) / (wall[1] - eye[1] - 0.5)
+    forward = np.arctan2(1.1, 3.5)
+    to_pixel = 160 / (2 * np.tan(0.275))
+    moved = (np.tan(np.arctan(tan) - forward) - np.tan(np.arctan(1.2 / 4.5) - forward)) * to_pixel
+    assert edge(1.5) - edge(1.0001) == pytest.approx(moved, abs=1.6)
+    assert abs(moved) > 2
+
+
+def test_light_below_the_surface_crosses_a_shadows_edge_and_keeps_its_sum(gl):
+    """A half-lit wall that scatters over 0.1 m: light where the shadow is, and as much missing before it."""
+    def wall(weight):
+        b = scenes.SceneBuilder()
+        b.quads(np.array([[[-2, 1, -2], [2, 1, -2], [2, 1, 2], [-2, 1, 2]]]),
+                scenes.principled(Base_Color=(0.8, 0.8, 0.8, 1), Subsurface_Weight=weight, Subsurface_Scale=0.1,
+                                  Subsurface_Radius=(1.0, 1.0, 1.0)))  # fmt: skip
+        b.quads(np.array([[[0, -3, -2], [3, -3, -2], [3, -3, 2], [0, -3, 2]]]), scenes.diffuse((0.5,) * 3), visibility=32)
+        b.light(scenes.sun_light((0, 1, 0), 5.0))
+        scene = b.build(scenes.perspective((0, -2.5, 0), (0, 0, 0), 0.5))
+        return ssdo(scene, "Diffuse Direct", samples=8, use_indirect_diffuse=False).passes["Diffuse Direct"][..., 0]
+
+    hard, soft = wall(0.0), wall(1.0)
+    middle = hard.shape[1] // 2
+    dark = slice(middle + 2, middle + 6)
+    assert hard[:, dark].max() < 0.05 * hard.max()
+    assert soft[:, dark].mean() > 0.1 * hard.max()
+    assert soft.mean() == pytest.approx(hard.mean(), rel=0.03)
+
+
+def test_radial_blur_shows_beams_of_a_light_in_the_picture_and_says_when_it_is_not(gl):
+    b = scenes.SceneBuilder()
+    b.quads(np.array([[[-3, 2, -2], [3, 2, -2], [3, 2, 2], [-3, 2, 2]]]), scenes.diffuse((0.1,) * 3))
+    b.quads(scenes.box_quads((0.5, -0.3, -0.3), (0.9, 0.1, 0.3)), scenes.diffuse((0.1,) * 3))
+    b.light(scenes.point_light((0, 0.5, 0), 50.0))
+    scene = b.build(scenes.perspective((0, -4, 0), (0, 0, 0), 0.8))
+    radial, march = (
+        ssdo(scene, "Volume Direct", samples=4, volume__density=0.1, ssdo__volumetric=v) for v in ("RADIAL", "MARCH")
+    )
+    a, c = radial.passes["Volume Direct"][..., 0], march.passes["Volume Direct"][..., 0]
+    # Left of the lamp nothing is in the way: the same light. Right of the box, its shadow.
+    assert a[:, :40].mean() == pytest.approx(c[:, :40].mean(), rel=0.05)
+    assert a[27, 80:].mean() < 0.75 * a[27, :16].mean()
+    assert not [n for n in radial.notes if "radial blur" in n]
+    scene.lights = [scenes.point_light((0, -6, 0), 50.0)]
+    result = ssdo(scene, "Volume Direct", samples=1, volume__density=0.1, ssdo__volumetric="RADIAL")
+    assert [n for n in result.notes if "outside the picture" in n]
+    assert result.passes["Volume Direct"].max() == 0.0
