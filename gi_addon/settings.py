@@ -164,7 +164,7 @@ class LPVSettings:
         higher="finer indirect light, less leaking through walls", lower="faster",
     )  # fmt: skip
     directions: str = _setting(
-        "48", "Directions", "Directions that light travels in through the grid",
+        "72", "Directions", "Directions that light travels in through the grid",
         choices=(("48", "48", "Faster; small bright patches may show as rays"), ("72", "72", "Smoother")),
     )  # fmt: skip
     glossy_rays: int = _setting(
