@@ -245,8 +245,8 @@ class VCTSettings:
         higher="finer directions, sharper contact", lower="faster, blurrier",
     )  # fmt: skip
     shadow_cones: bool = _setting(
-        False, "Shadow Cones", "Direct light's shadows by cones through the voxels in place of shadow maps: soft at one sub-frame, "
-        "as fine as the grid",
+        False, "Shadow Cones", "Direct light's shadows by cones through the voxels in place of shadow maps: soft at one "
+        "sub-frame, as fine as the grid",
     )  # fmt: skip
     emissive_voxels: bool = _setting(
         False, "Emissive Voxels", "Emissive surfaces shine out of the voxels, into the indirect passes: any number of them "
