@@ -371,7 +371,7 @@ def test_every_pass_is_finite_whatever_the_scene(gl, sources):
 
 OTHER = {
     "ssdo.samples": 64, "ssdo.steps": 4, "ssdo.integrator": "BITMASK", "ssdo.radius": 0.2, "ssdo.thickness": 0.02,
-    "ssdo.margin": 0.25, "ssdo.sources": "SCREEN", "ssdo.occlusion": "MITTRING", "ssdo.shadows": "SCREEN",
+    "ssdo.margin": 0.25, "ssdo.sources": "SCREEN", "ssdo.occlusion": "BITMASK", "ssdo.shadows": "SCREEN",
     "ssdo.contact": 0.5, "ssdo.volumetric": "RADIAL",
 }  # fmt: skip
 
