@@ -200,7 +200,7 @@ class SSDOSettings:
         low=0.01, high=10.0, higher="fewer leaks behind things", lower="light passes behind thin things",
     )  # fmt: skip
     occlusion: str = _setting(
-        "BITMASK", "Ambient Occlusion", "How the Ambient Occlusion pass is made",
+        "MITTRING", "Ambient Occlusion", "How the Ambient Occlusion pass is made",
         choices=(("BITMASK", "Visibility Bitmask", "Sectors of slices that samples fill"),
                  ("MITTRING", "Mittring", "Points along directions, as the other techniques and the paper do")),
     )  # fmt: skip
