@@ -43,6 +43,12 @@ class Facts:
     medium: Medium | None = None  # that fills the world
     margin: int = 0  # px drawn beyond each side of the picture
     stamps: dict[str, str] = field(default_factory=dict)
+    emitters: Emitters = field(default_factory=Emitters.none)  # all of them, sampled as lights or not
+
+    @property
+    def glowing_voxels(self) -> bool:
+        """Whether emissive surfaces shine out of voxels rather than as lights drawn from them."""
+        return len(self.emitters) > 0 and voxels_shine(self.settings)
 
     @property
     def layers(self) -> tuple[str, ...]:
@@ -69,6 +75,11 @@ class Facts:
         return self.settings.technique == "SSDO" and self.settings.ssdo.sources == "SCREEN"
 
 
+def voxels_shine(settings: Settings) -> bool:
+    """Whether the technique takes emission from voxels."""
+    return settings.technique == "VCT" and settings.vct.emissive_voxels and settings.use_area_lights
+
+
 def gather_facts(
     scene: Scene,
     compiled: list[CompiledGraph],
@@ -83,19 +94,23 @@ def gather_facts(
     margin = round(settings.ssdo.margin * max(resolution)) if settings.technique == "SSDO" else 0
     bounds = scene.bounds()
     s = settings
+    seen = scene.instances.visibility & CAMERA if len(scene.instances) else np.zeros(0, "u4")
+    used = {m for i, ms in enumerate(scene.instances.materials) if seen[i] for m in ms}
+    some = [compiled[m] for m in used]
+    # Whatever looks at lit surfaces looks at the lights' bounce maps.
+    bounced = s.use_indirect_diffuse or (s.use_glossy and any(c.glossy for c in some))
+    bounced = bounced or (s.use_translucency and any(c.transmissive or c.subsurface for c in some))
     from_screen = s.technique == "SSDO" and s.ssdo.sources == "SCREEN"
     rig = build_rig(
         scene.lights, bounds,
         world=None if from_screen else world, world_samples=s.world.samples,
-        emitters=Emitters.none() if from_screen else emitters, emitter_samples=_EMITTER_SAMPLES, area_lights=s.use_area_lights,
+        emitters=Emitters.none() if from_screen or voxels_shine(s) else emitters, emitter_samples=_EMITTER_SAMPLES,
+        area_lights=s.use_area_lights,
         shadows=s.use_shadows and not (s.technique == "SSDO" and s.ssdo.shadows == "SCREEN"),
-        bounces=s.use_indirect_diffuse and s.bounces > 0 and s.technique != "SSDO",
+        bounces=s.bounces > 0 and bounced and s.technique != "SSDO",
         shadow_resolution=s.shadows.resolution, bounce_resolution=s.rsm.resolution,
         world_resolution=s.world.resolution,
     )  # fmt: skip
-    seen = scene.instances.visibility & CAMERA if len(scene.instances) else np.zeros(0, "u4")
-    used = {m for i, ms in enumerate(scene.instances.materials) if seen[i] for m in ms}
-    some = [compiled[m] for m in used]
     return Facts(
         settings=s,
         resolution=(resolution[0] + 2 * margin, resolution[1] + 2 * margin),
@@ -118,4 +133,5 @@ def gather_facts(
         world_visible=scene.world.visible_camera,
         medium=mean_medium(scene.world.graph, scene.images),
         stamps=scene.stamps(),
+        emitters=emitters,
     )

@@ -423,6 +423,9 @@ def build_rig(
     if len(emitters) and area_lights:
         sources += [Source(LIGHT_MESH, 12, None, 6, True, k, emitter_samples) for k in range(emitter_samples)]
 
+    radius = 0.5 * float(np.linalg.norm(bounds[1] - bounds[0]))
+    coarser = _coarser_maps({s.seed: _power(s.light, radius) for s in sources if s.light is not None})
+
     def tiles(resolution: int, used, *, bounce: bool) -> Maps:
         sizes: list[int] = []
         first: list[int] = []
@@ -435,6 +438,8 @@ def build_rig(
             if source.kind == LIGHT_WORLD:
                 # The sky's bounce needs no detail: its many directions blur it. Materials are dear to draw, depth is not.
                 base = min(resolution, world_resolution // 2 if bounce else world_resolution)
+            if bounce and source.light is not None:
+                base = max(16, base >> coarser[source.seed])
             size = base if source.views == 1 else base // 2
             sizes += [max(16, size)] * source.views
         while sum(s * s for s in sizes) > texel_budget and max(sizes) > 16:
@@ -451,13 +456,37 @@ def build_rig(
         # What is drawn anew in each sub-frame anyway, at the very point that direct light comes from, is drawn once if
         # it is fine enough.
         drawn_anew = source.kind in (LIGHT_AREA, LIGHT_MESH) and bounced(source)
-        return not (drawn_anew and bounce_resolution >= shadow_resolution)
+        coarse = source.light is not None and coarser[source.seed] > 0
+        return not (drawn_anew and bounce_resolution >= shadow_resolution and not coarse)
 
     return LightRig(
         sources, bounds, world, emitters,
         tiles(shadow_resolution, own_shadow_map, bounce=False), tiles(bounce_resolution, bounced, bounce=True),
         notes,
     )  # fmt: skip
+
+
+# As many lamps have bounce maps of full resolution, whatever they shine; more share those texels by their power.
+_FULL_MAPS = 4
+
+
+def _power(light: Light, radius: float) -> float:
+    """Luminous power that a lamp sends into a scene of ``radius`` m, W."""
+    power = float(np.abs(light.emission) @ np.array([0.2126, 0.7152, 0.0722]))
+    if light.kind == "SUN":
+        return power * np.pi * radius**2
+    return power * (0.5 * (1.0 - np.cos(0.5 * light.spot_size)) if light.kind == "SPOT" else 1.0)
+
+
+def _coarser_maps(powers: dict[int, float]) -> dict[int, int]:
+    """By how many powers of two each lamp's bounce map is coarser: a texel of any stands for as much flux, and all maps
+    together have the texels of ``_FULL_MAPS``."""
+    total = sum(powers.values())
+    if len(powers) <= _FULL_MAPS or not total > 0.0:
+        return dict.fromkeys(powers, 0)
+    # Half the side is a fourth of the texels.
+    steps = {k: -0.5 * np.log2(max(_FULL_MAPS * p / total, 1e-6)) for k, p in powers.items()}
+    return {k: int(np.clip(np.floor(v), 0, 5)) for k, v in steps.items()}
 
 
 def _unit(v: np.ndarray) -> np.ndarray:

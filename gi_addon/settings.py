@@ -54,6 +54,8 @@ def _group(cls: type) -> Any:
 
 TECHNIQUES = (
     ("RSM", "Reflective Shadow Maps", "One bounce gathered from virtual point lights on what the lights see"),
+    ("LPV", "Light Propagation Volumes", "Bounces carried through a grid of cells over the scene"),
+    ("VCT", "Voxel Cone Tracing", "Bounces gathered by cones through a grid of lit cells"),
     ("SSDO", "Screen-Space Directional Occlusion", "Bounces gathered from what the camera sees"),
 )
 
@@ -154,19 +156,38 @@ class RSMSettings:
 
 
 @dataclass
+class LPVSettings:
+    """Light propagation volumes (Kaplanyan and Dachsbacher 2010)."""
+
+    resolution: int = _setting(
+        32, "Resolution", "Cells along the longest side of the scene", low=8, high=128, unit="cells",
+        higher="finer indirect light, less leaking through walls", lower="faster",
+    )  # fmt: skip
+    directions: str = _setting(
+        "48", "Directions", "Directions that light travels in through the grid",
+        choices=(("48", "48", "Faster; small bright patches may show as rays"), ("72", "72", "Smoother")),
+    )  # fmt: skip
+    glossy_rays: int = _setting(
+        2, "Glossy Rays", "Rays through the grid per pixel and sub-frame for glossy reflections", low=1, high=64,
+        higher="less noise on rough surfaces", lower="faster",
+    )  # fmt: skip
+    occlusion: bool = _setting(True, "Occlusion", "Objects stop light on its way through the grid")
+
+
+@dataclass
 class SSDOSettings:
     """Screen-space directional occlusion (Ritschel, Grosch and Seidel 2009)."""
 
     samples: int = _setting(
-        256, "Samples", "Points tested in the depth buffer per gathering pixel, sub-frame and bounce", low=8, high=4096,
+        512, "Samples", "Points tested in the depth buffer per gathering pixel, sub-frame and bounce", low=8, high=4096,
         higher="less noise", lower="faster",
     )  # fmt: skip
     steps: int = _setting(
-        16, "Steps", "How many of the samples lie along one ray, or on one side of one slice", low=2, high=256,
+        32, "Steps", "How many of the samples lie along one ray, or on one side of one slice", low=2, high=256,
         higher="finds thin and far things; fewer directions", lower="more directions; misses small things",
     )  # fmt: skip
     integrator: str = _setting(
-        "BITMASK", "Integrator", "How directions are covered",
+        "RAYS", "Integrator", "How directions are covered",
         choices=(("RAYS", "Rays", "Cosine-distributed rays, each followed to its first hit"),
                  ("BITMASK", "Visibility Bitmask", "Slices of the hemisphere in 32 sectors that samples fill")),
     )  # fmt: skip
@@ -212,6 +233,32 @@ class SSDOSettings:
 
 
 @dataclass
+class VCTSettings:
+    """Voxel cone tracing (Crassin et al. 2011)."""
+
+    resolution: int = _setting(
+        64, "Resolution", "Cells along the longest side of the voxel grid", low=16, high=512,
+        higher="thinner walls hold, finer bounce light", lower="faster, less memory",
+    )  # fmt: skip
+    cones: int = _setting(
+        6, "Cones", "Cones traced from each point into its hemisphere and sub-frame", low=1, high=64,
+        higher="finer directions, sharper contact", lower="faster, blurrier",
+    )  # fmt: skip
+    shadow_cones: bool = _setting(
+        False, "Shadow Cones", "Direct light's shadows by cones through the voxels in place of shadow maps: soft at one sub-frame, "
+        "as fine as the grid",
+    )  # fmt: skip
+    emissive_voxels: bool = _setting(
+        False, "Emissive Voxels", "Emissive surfaces shine out of the voxels, into the indirect passes: any number of them "
+        "without noise, as fine as the grid; else lights are drawn from them, into the direct passes",
+    )  # fmt: skip
+    continuous_voxelization: bool = _setting(
+        False, "Continuous Voxelization", "Voxelize in every sub-frame, as the paper's Table 2 has it; else only when a "
+        "mesh, a transform or a material has changed. Light is always injected anew when it changes",
+    )  # fmt: skip
+
+
+@dataclass
 class Settings:
     """All of ``scene.quartet``."""
 
@@ -236,7 +283,7 @@ class Settings:
         "sub-frames are shared among them", low=1, high=256, higher="smoother streaks, longer sync", lower="faster; 1 is sharp",
     )  # fmt: skip
     bounces: int = _setting(
-        1, "Bounces", "Diffuse bounces of light; 1 is the paper's", low=0, high=8,
+        1, "Bounces", "Diffuse bounces of light, as far as the technique can; 1 is the paper's", low=0, high=16,
         higher="brighter interiors", lower="0 is direct light only",
     )  # fmt: skip
     gather_scale: int = _setting(
@@ -257,6 +304,8 @@ class Settings:
     world: WorldSettings = _group(WorldSettings)
     volume: VolumeSettings = _group(VolumeSettings)
     rsm: RSMSettings = _group(RSMSettings)
+    lpv: LPVSettings = _group(LPVSettings)
+    vct: VCTSettings = _group(VCTSettings)
     ssdo: SSDOSettings = _group(SSDOSettings)
 
     # -- access by dotted name ---------------------------------------------------------------------------------

@@ -30,7 +30,7 @@ CHARACTER = {
 }  # fmt: skip
 _GROUPS = [f.name for f in dataclasses.fields(Settings) if dataclasses.is_dataclass(getattr(Settings(), f.name))]
 _TECHNIQUES = {name: label for name, label, _ in TECHNIQUES}
-_SAMPLING = ("samples", "viewport_samples")
+_SAMPLING = ("samples", "viewport_samples", "motion_steps")
 _FILM = ("pixel_filter", "filter_width")
 _ELSEWHERE = {"technique", *RESOURCES, *_SAMPLING, *_FILM}
 _TOP = [path for path, _, _ in walk() if "." not in path]
@@ -119,8 +119,8 @@ class QUARTET_PT_sampling(_Panel, bpy.types.Panel):
 
     def draw(self, context):
         column = self._column()
-        column.prop(context.scene.quartet, "samples", text="Render")
-        column.prop(context.scene.quartet, "viewport_samples", text="Viewport")
+        for name, text in zip(_SAMPLING, ("Render", "Viewport", "Motion Steps"), strict=True):
+            column.prop(context.scene.quartet, name, text=text)
 
 
 class QUARTET_PT_effects(_Panel, bpy.types.Panel):

@@ -14,17 +14,19 @@ from gi_addon.settings import SettingError, Settings, markdown, walk
 
 # A value unlike the default for every setting, so that a new one without an entry fails here.
 OTHER = {
-    "technique": None, "use_indirect_diffuse": False, "use_glossy": None, "use_shadows": False, "use_ao": False,
+    "technique": None, "use_indirect_diffuse": False, "use_glossy": False, "use_shadows": False, "use_ao": False,
     "use_translucency": False, "use_volumetric": False, "use_area_lights": False, "samples": 3,
     "viewport_samples": None, "bounces": 0, "pixel_filter": "BLACKMAN_HARRIS", "filter_width": 3.0,
     "shadows.resolution": 64, "shadows.softness": 6.0, "ao.samples": 1, "ao.steps": 1, "ao.distance": 0.3,
-    "ao.contact": 0.005, "world.samples": 1, "world.aimed": False, "world.resolution": 64, "rsm.resolution": 32, "rsm.samples": 7,
+    "ao.contact": 0.005, "world.samples": 1, "world.aimed": False, "world.resolution": 64,
+    "rsm.resolution": 32, "rsm.samples": 7,
     "volume.samples": 2, "volume.density": 0.2, "volume.anisotropy": 0.5, "rsm.visibility": "NONE",
     "rsm.visibility_resolution": 32,
     "gather_scale": 1, "motion_steps": None,
+    "lpv.resolution": 16, "lpv.directions": "72", "lpv.glossy_rays": 1, "lpv.occlusion": False,
 }  # fmt: skip
 # Not read by the picture itself: the viewport's own number of sub-frames; and effects whose techniques have yet to land.
-ELSEWHERE = {"viewport_samples", "motion_steps", "technique", "use_glossy"}
+ELSEWHERE = {"viewport_samples", "motion_steps", "technique"}
 
 
 @functools.cache
@@ -53,15 +55,15 @@ def picture(path="", **settings):
 
 
 # Those of a technique that is not the default are tested with it.
-@pytest.mark.parametrize("path", [p for p, _, _ in walk() if not p.startswith("ssdo.")])
+@pytest.mark.parametrize("path", [p for p, _, _ in walk() if not p.startswith(("ssdo.", "vct."))])
 def test_every_setting_changes_the_picture_or_the_plan(gl, path):
     if path in ELSEWHERE:
         assert OTHER[path] is None
         return
-    haze = {"volume__density": 0.1} if path in IN_HAZE else {}
+    where = {"volume__density": 0.1} if path in IN_HAZE else {"technique": "LPV"} if path.startswith("lpv.") else {}
     if path == "world.aimed":
-        haze["samples"] = 4  # fewer are not aimed
-    result, base = picture(path, **haze), picture(**haze)
+        where["samples"] = 4  # fewer are not aimed
+    result, base = picture(path, **where), picture(**where)
     changed = any(not np.array_equal(result.passes[n], base.passes[n]) for n in base.passes)
     assert changed or result.plan.text() != base.plan.text()
 

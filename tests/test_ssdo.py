@@ -86,17 +86,19 @@ def wall_points(camera, shape) -> tuple[np.ndarray, np.ndarray]:
 
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_a_lit_floor_lights_a_wall_by_its_form_factor(gl, integrator):
-    """E = ρ E_sun F with Lambert's polygon formula, both surfaces on the screen: the mean to 3 %, every part to 15 %."""
+    """E = ρ E_sun F with Lambert's polygon formula, both surfaces on the screen: the mean to 2 %, three heights of the wall to
+    5 %, single pixels to 10 % in the mean."""
     camera = scenes.perspective((0.3, -3.2, 1.8), (0, 0.3, 0.3), 0.9)
-    image = ssdo(corner(camera), "Diffuse Indirect", samples=16, ssdo__integrator=integrator).passes["Diffuse Indirect"][..., 0]
+    image = ssdo(corner(camera), "Diffuse Indirect", samples=8, gather_scale=1,
+                 ssdo__integrator=integrator).passes["Diffuse Indirect"][..., 0]  # fmt: skip
     on, points = wall_points(camera, image.shape)
     expected = 0.8 * 5.0 / np.pi * polygon_irradiance(points, (0, -1, 0), FLOOR) / np.pi
     got = image[on]
-    assert got.mean() == pytest.approx(expected.mean(), rel=0.03)
+    assert got.mean() == pytest.approx(expected.mean(), rel=0.02)
     for low, high in ((0.0, 0.3), (0.3, 0.6), (0.6, 1.0)):
         part = (points[:, 2] >= low) & (points[:, 2] < high)
         assert got[part].mean() == pytest.approx(expected[part].mean(), rel=0.05), (low, high)
-    assert np.abs(got / expected - 1).mean() < 0.15
+    assert np.abs(got / expected - 1).mean() < 0.1
 
 
 @pytest.mark.parametrize("integrator", INTEGRATORS)
@@ -120,6 +122,19 @@ def test_brightness_does_not_change_with_zoom_view_or_size(gl, integrator):
         expected = 0.8 * 5.0 / np.pi * polygon_irradiance(points, (0, -1, 0), FLOOR) / np.pi
         gains.append(p["Diffuse Indirect"][..., 0][on].sum() / expected.sum())
     assert np.abs(np.array(gains) - 1).max() <= 0.03, gains
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_the_low_resolution_gather_changes_little(gl, integrator):
+    """Smoothed and interpolated over blocks of 4 pixels: the mean within 3 %, and each pixel within 8 % in the mean."""
+    scene = corner(scenes.perspective((0.3, -3.2, 1.8), (0, 0.3, 0.3), 0.9))
+    full, low = (
+        ssdo(scene, "Diffuse Indirect", samples=8, resolution=(160, 90), gather_scale=s, ssdo__integrator=integrator,
+             ssdo__samples=256).passes["Diffuse Indirect"]
+        for s in (1, 4)
+    )  # fmt: skip
+    assert low.mean() == pytest.approx(full.mean(), rel=0.03)
+    assert np.abs(low - full).mean() / full.mean() < 0.08
 
 
 @pytest.mark.parametrize("bounces", [2, 4])
@@ -298,7 +313,7 @@ def test_what_is_switched_off_does_not_run(gl):
 
 
 OTHER = {
-    "ssdo.samples": 64, "ssdo.steps": 4, "ssdo.integrator": "RAYS", "ssdo.radius": 0.2, "ssdo.thickness": 0.02,
+    "ssdo.samples": 64, "ssdo.steps": 4, "ssdo.integrator": "BITMASK", "ssdo.radius": 0.2, "ssdo.thickness": 0.02,
     "ssdo.margin": 0.25, "ssdo.sources": "SCREEN", "ssdo.occlusion": "MITTRING", "ssdo.shadows": "SCREEN",
     "ssdo.contact": 0.5, "ssdo.volumetric": "RADIAL",
 }  # fmt: skip
@@ -388,7 +403,7 @@ def test_screen_shadows_need_no_shadow_map_and_contacts_mend_a_coarse_one(gl):
     maps, contacts = (ssdo(scene, "Diffuse Direct", ssdo__shadows=s, **coarse).passes["Diffuse Direct"]
                       for s in ("MAPS", "CONTACT"))  # fmt: skip
     assert (contacts <= maps + 1e-6).all()
-    assert np.square(contacts - fine).mean() < 0.75 * np.square(maps - fine).mean()
+    assert np.square(contacts - fine).mean() < 0.9 * np.square(maps - fine).mean()
 
 
 def glass(ior: float, **settings):

@@ -592,7 +592,7 @@ def linearity(suite: Suite) -> Finding:
     def box(*lights):
         scene = scenes.cornell(blocks=False)
         scene.lights = list(lights)
-        return suite.render(scene, "Diffuse Direct", "Diffuse Indirect", samples=64 if suite.full else 32, use_ao=False).passes
+        return suite.render(scene, "Diffuse Direct", "Diffuse Indirect", samples=64 if suite.full else 8, use_ao=False).passes
 
     one, two = scenes.point_light((-0.4, 0, 1.5), 40.0), scenes.spot_light((0.3, 0, 1.9), (0, 0, 0), 90.0, 1.4, 0.3)
     both, first, second = box(one, two), box(one), box(two)

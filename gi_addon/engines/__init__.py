@@ -7,7 +7,12 @@ from collections.abc import Callable
 
 from ..graph import Pass
 from ..settings import Settings
-from . import rsm, ssdo
+from . import lpv, rsm, ssdo, vct
 
 # Technique -> its passes in execution order, for the settings and the film layers wanted.
-TECHNIQUES: dict[str, Callable[[Settings, tuple[str, ...]], list[Pass]]] = {"RSM": rsm.passes, "SSDO": ssdo.passes}
+TECHNIQUES: dict[str, Callable[[Settings, tuple[str, ...]], list[Pass]]] = {
+    "RSM": rsm.passes,
+    "LPV": lpv.passes,
+    "VCT": vct.passes,
+    "SSDO": ssdo.passes,
+}

@@ -258,7 +258,8 @@ class IndirectLighting(Pass):
 
 _RAY_READS = (
     "occupancy", "rsm.depth", "rsm.normal", "rsm.albedo", "rsm.lights", "rsm.views", "gbuffer.depth", "gbuffer.normal",
-    Optional("vpls"), Optional("gbuffer.emission", ("transmission.indirect",)), Optional("gbuffer.diffuse"), Optional("direct.diffuse"), Optional("indirect.diffuse"),
+    Optional("vpls"), Optional("gbuffer.emission", ("transmission.indirect",)), Optional("gbuffer.diffuse"),
+    Optional("direct.diffuse"), Optional("indirect.diffuse"),
 )  # fmt: skip
 _RAY_UNIFORMS = (
     *CELL_UNIFORMS,

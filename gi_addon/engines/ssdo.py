@@ -36,6 +36,7 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         bounces += [
             SentLight(bounce),
             InterpolatedIndirect(f"ssdo.sent.{bounce}", f"ssdo.low.{bounce}"),
+            Smoothing(f"ssdo.sent.{bounce}", f"ssdo.low.{bounce}"),
             IndirectLighting(f"ssdo.sent.{bounce}", f"ssdo.low.{bounce}",
                              "indirect.diffuse" if last else f"ssdo.bounce.{bounce}"),
         ]  # fmt: skip
@@ -50,6 +51,7 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         AOGeneration() if settings.ssdo.occlusion == "MITTRING" else AOScan(),
         AOBlur(),
         InterpolatedIndirect("gbuffer.emission", "screen.low"),
+        Smoothing("gbuffer.emission", "screen.low"),
         IndirectLighting("gbuffer.emission", "screen.low", "screen.light"),
         DirectLighting() if settings.ssdo.shadows == "MAPS" or not settings.use_shadows else ScreenShadowLighting(),
         *bounces,
@@ -177,13 +179,35 @@ class InterpolatedIndirect(_Gather):
         self.title = f"{_title(sent)} (low resolution)"
         self.reads = ("ssdo.planes", _read(sent), "gbuffer.low_depth", "gbuffer.low_normal", "gbuffer.low_pixel")
         self.writes = (
+            Texture(f"{low}.raw", "raw_indirect", _LIGHT, "rgba32f", gather_size, scratch=True),
+            Texture(f"{low}.raw_direction", "raw_direction", "Σ luminance × direction, and Σ luminance, of what arrives",
+                    "rgba32f", gather_size, scratch=True),
+        )  # fmt: skip
+
+    def absent(self, facts: Facts) -> str | None:
+        return super().absent(facts) or (None if facts.settings.gather_scale > 1 else "every pixel gathers for itself")
+
+
+class Smoothing(Pass):
+    """Neighbouring blocks of one surface share their directions."""
+
+    figure = "Gaussian Blur"
+    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/ssdo/smooth_frag.glsl"}}
+
+    def __init__(self, sent: str, low: str) -> None:
+        self.title = f"{_title(sent)} (smoothing)"
+        self.reads = (f"{low}.raw", f"{low}.raw_direction", "gbuffer.low_depth", "gbuffer.low_normal", "gbuffer.low_pixel")
+        self.writes = (
             Texture(low, "low_indirect", _LIGHT, "rgba32f", gather_size, scratch=True),
             Texture(f"{low}.direction", "low_direction", "Σ luminance × direction, and Σ luminance, of what arrives", "rgba32f",
                     gather_size, scratch=True),
         )  # fmt: skip
 
-    def absent(self, facts: Facts) -> str | None:
-        return super().absent(facts) or (None if facts.settings.gather_scale > 1 else "every pixel gathers for itself")
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return {"GATHER_SCALE": facts.settings.gather_scale}
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        frame.screen(planned, frame.program(planned))
 
 
 class IndirectLighting(_Gather):
@@ -430,7 +454,7 @@ class RadialBlur(Volumetric):
 
     def defines(self, facts: Facts) -> dict[str, int]:
         # Without the camera's surfaces there is nothing in the way.
-        return {"RADIAL_BLUR": int(facts.visible), "HAS_LIGHT_VIEWS": 0, "HAS_SHADOW_DEPTH": 0, "HAS_RSM_DEPTH": 0}
+        return {"RADIAL_BLUR": int(facts.visible), "VOXEL_VISIBILITY": 0, "HAS_LIGHT_VIEWS": 0, "HAS_SHADOW_DEPTH": 0, "HAS_RSM_DEPTH": 0}
 
     def run(self, frame: Frame, planned: Planned) -> None:
         if frame.subframe == 0:

@@ -77,16 +77,13 @@ class SceneSync:
                     uid = data.original.session_uid
                     self._meshes = {k: v for k, v in self._meshes.items() if k[0] != uid}
                     self._hairs = {k: v for k, v in self._hairs.items() if k[0] != uid}
-            elif isinstance(data, (bpy.types.Mesh, bpy.types.Curve, bpy.types.MetaBall)):
-                changed = True
-                if update.is_updated_geometry:
-                    self._meshes = {k: v for k, v in self._meshes.items() if k[1] != data.name_full}
-            elif isinstance(data, bpy.types.Image):
-                changed = True
+                continue
+            # Node trees are read again anyway and compared. A scene or collection may have lost or hidden objects.
+            changed = True
+            if isinstance(data, bpy.types.Image):
                 self._images.pop(data.original.session_uid, None)
-            else:
-                # Node trees are read again anyway and compared. A scene or collection may have lost or hidden objects.
-                changed = True
+            elif update.is_updated_geometry:  # a mesh, curve … that several objects may use
+                self._meshes = {k: v for k, v in self._meshes.items() if k[1] != data.name_full}
         return changed
 
     def read(

@@ -21,7 +21,7 @@ import gpu
 import numpy as np
 from gpu_extras.presets import draw_texture_2d
 
-from ..gl import Cancelled, CancelToken, GLError, shared
+from ..gl import Cancelled, CancelToken, GLContextLost, GLError, shared
 from ..graph import Plan
 from ..renderer import Renderer, RenderError
 from ..scene import Camera, Scene
@@ -92,6 +92,7 @@ class Viewport:
         self._scale = _COARSEST
         self._first: float | None = None
         self._failed: tuple | None = None
+        self._lost = False
         self._picture: Picture | None = None
         self._texture: tuple[Picture, gpu.types.GPUTexture] | None = None
         # Of the GL thread: the renderer, its plan, and the request and sub-frame that its film is ready for.
@@ -133,7 +134,9 @@ class Viewport:
         _watch()
 
     def close(self) -> None:
-        """Stop, and give the GPU's memory back without waiting for it."""
+        """Stop, and give the GPU's memory back without waiting for it. Once: Blender may free the engine long after."""
+        if self not in _live:
+            return
         _live.discard(self)
         self._token.cancel()
         self._texture = self._picture = self._request = self._scene = None
@@ -268,6 +271,12 @@ class Viewport:
             picture = job.result()
         except Cancelled:
             return
+        except GLContextLost as error:
+            # The driver dropped it; the next job starts a new one. Once: a driver that keeps doing so needs its user.
+            if self._lost:
+                self._fail(str(error), self._request.key if self._request else None)
+            self._lost = not self._lost
+            return
         except Exception as error:
             text = str(error) if isinstance(error, (RenderError, GLError)) else f"{type(error).__name__}: {error}"
             self._fail(text, self._request.key if self._request else None)
@@ -276,6 +285,7 @@ class Viewport:
         begun = old is None or old.request.key != picture.request.key or old.request.scale != picture.request.scale
         self.counts["subframes"] += picture.subframes - (0 if begun else old.subframes)
         self._picture = picture
+        self._lost = False
         if begun:
             if picture.first > 0.0:
                 self._first = picture.first

@@ -15,7 +15,8 @@ class DirectLighting(Pass):
     title = "Direct Lighting Computation"
     figure = "Direct Lighting Computation"
     reads = (
-        "lights", Optional("lights.views"), Optional("shadow.depth"), Optional("rsm.depth"), "gbuffer.depth", "gbuffer.normal",
+        "lights", Optional("lights.views"), Optional("shadow.depth"), Optional("rsm.depth"),
+        Optional("shadow.cones"), "gbuffer.depth", "gbuffer.normal",
         Optional("gbuffer.specular", ("direct.glossy",)), Optional("gbuffer.lobe", ("direct.glossy",)),
         Optional("brdf.energy", ("direct.glossy",)), Optional("brdf.average", ("direct.glossy",)),
         Optional("direct.subsurface", ("direct.diffuse",)),

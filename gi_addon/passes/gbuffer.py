@@ -117,7 +117,7 @@ class TranslucentBack(Pass):
 
     def run(self, frame: Frame, planned: Planned) -> None:
         frame.gl.ctx.depth_func = ">"
-        _draw_translucent(frame, planned, clear=0.0, mode=moderngl.DEPTH_TEST, shader="translucent_back", far=0.0)
+        _draw_translucent(frame, planned, clear=0.0, mode=moderngl.DEPTH_TEST, far=0.0)
         frame.gl.ctx.depth_func = "<"
 
 
@@ -127,8 +127,8 @@ class TranslucentTint(Pass):
     title = "Transparency Tint"
     reads = TranslucentLayer.reads
     writes = (
-        Texture("gbuffer.transmission", "gbuf_transmission", "tint of all refracting surfaces in front of the opaque one; alpha 0 where there are any",
-                "rgba16f", _screen),
+        Texture("gbuffer.transmission", "gbuf_transmission", "tint of all refracting surfaces in front of the opaque one; alpha "
+                "0 where there are any", "rgba16f", _screen),
     )  # fmt: skip
 
     def defines(self, facts: Facts) -> dict[str, int]:
@@ -150,7 +150,7 @@ def _nothing_refracts(facts: Facts) -> str | None:
 
 
 def _draw_translucent(
-    frame: Frame, planned: Planned, *, clear: float, mode: int, shader: str = "translucent", far: float = 1.0
+    frame: Frame, planned: Planned, *, clear: float, mode: int, far: float = 1.0
 ) -> None:
     fbo = frame.targets(planned)
     fbo.use()
@@ -161,7 +161,7 @@ def _draw_translucent(
     frame.bind(planned)
     frame.gpu.draw(
         planned,
-        {"vertex": "surface/surface_vert.glsl", "fragment": f"passes/{shader}_frag.glsl"},
+        {"vertex": "surface/surface_vert.glsl", "fragment": "passes/translucent_frag.glsl"},
         CAMERA,
         np.ascontiguousarray(frame.view["clip_from_world"]),
         full=True,
@@ -171,6 +171,7 @@ def _draw_translucent(
             "SURFACE_TABLES": int(planned.has("brdf.albedo")), "SURFACE_SEE_THROUGH_GLASS": 1,
             "SURFACE_SEEN_BY_CAMERA": 1, "SURFACE_SEEN_BY_SHADOW": 0,
             "TINT_ONLY": int(planned.has("gbuffer.transmission")),
+            **{f"HAS_{w.glsl.upper()}": int(planned.has(w.name)) for w in (*TranslucentLayer.writes, *TranslucentBack.writes)},
         },
     )  # fmt: skip
 

@@ -87,7 +87,7 @@ class Volumetric(Pass):
     shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "passes/volumetric_frag.glsl"}}
 
     def defines(self, facts: Facts) -> dict[str, int]:
-        return {"RADIAL_BLUR": 0}
+        return {"RADIAL_BLUR": 0, "VOXEL_VISIBILITY": 0}
 
     def absent(self, facts: Facts) -> str | None:
         if not facts.settings.use_volumetric:

@@ -60,6 +60,9 @@ void main()
             vec3 receiver_ws = position_ws + n * depth_bulge.g;
             vec3 receiver_ng = behind ? n : ng;
             float visible = 1.0;
+#if HAS_SHADOW_CONES
+            visible = texelFetch(shadow_cones, ivec3(pixel, i), 0).r;
+#else
             if (light.views > 0) {
                 LightView v = light_views[light_view_of(light, position_ws)];
 #if HAS_SHADOW_DEPTH
@@ -73,6 +76,7 @@ void main()
                 }
 #endif
             }
+#endif
 #if HAS_MEDIUM
             arriving *= medium_transmittance(position_ws, l, light_is_directional(light) ? 1e30 : length(light.position_ws - position_ws));
 #endif

@@ -29,6 +29,12 @@ void main()
     n = dot(n, n) < 0.5 ? p.normal_ws : n;
     float weight = luminance(c.transmission);
     float eta = weight > 0.0 ? max(c.transmission_eta / weight, 1e-3) : 1.0;
+#if HAS_TRANSLUCENT_BACK_DEPTH
+    translucent_back_depth = depth;
+#endif
+#if HAS_TRANSLUCENT_BACK_NORMAL
+    translucent_back_normal = vec4(octahedral_encode(n), octahedral_encode(p.geometric_normal_ws));
+#endif
 #if HAS_TRANSLUCENT_DEPTH
     translucent_depth = depth;
 #endif

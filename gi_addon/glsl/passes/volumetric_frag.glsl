@@ -15,10 +15,16 @@
 #include "engines/ssdo/radial_lib.glsl"
 #endif
 
+#if VOXEL_VISIBILITY
+#include "engines/vct/air_lib.glsl"
+#endif
+
 // Whether light gets to a point of the air: its texel's depth alone, the sub-frames blur it.
 float air_visibility(Light light, vec3 position_ws)
 {
-#if HAS_LIGHT_VIEWS
+#if VOXEL_VISIBILITY
+    return voxel_visibility(light, position_ws);
+#elif HAS_LIGHT_VIEWS
     if (light.views <= 0) {
         return 1.0;
     }

@@ -1,0 +1,511 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Light propagation volumes, Figure 4b of the paper.
+
+A. Kaplanyan and C. Dachsbacher, "Cascaded Light Propagation Volumes for Real-Time Indirect Illumination", I3D 2010. What the
+lights see is injected into a grid over the scene, carried from cell to cell along discrete ordinates, stopped by a volume of
+the scene's geometry, and looked up at each pixel.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import permutations, product
+
+import moderngl
+import numpy as np
+
+from ..facts import Facts
+from ..frame import Frame
+from ..gpu_types import LIGHT_AREA, LIGHT_SUN, LIGHT_WORLD
+from ..graph import Buffer, Optional, Pass, Planned, Texture, Uniform
+from ..passes.ao import AOBlur
+from ..passes.brdf_tables import BRDFTables
+from ..passes.direct_lighting import DirectLighting
+from ..passes.gbuffer import GBuffer, TranslucentBack, TranslucentLayer, TranslucentTint, _screen
+from ..passes.lights import LightList, RSMGeneration, ShadowMaps
+from ..passes.resolve import Resolve
+from ..passes.volumetric import MEDIUM_UNIFORMS, Volumetric, air, medium_defines, set_medium
+from ..scene import SHADOW
+from ..settings import Settings
+from .rsm import Subsurface
+
+SH_COUNT = 9
+# Points of a cell's cross-section that the geometry is tested at, along each side: odd, so that one is in the middle, and
+# their squares are bits of one word.
+_POINTS = 5
+# Bytes of ordinates carried at once; more go in turns, so that fine grids fit.
+_BATCH_BYTES = 64 << 20
+# Texels along a side of a 3D texture that every OpenGL 4.3 allows.
+_LEAST_3D_SIZE = 2048
+# Fixed point keeps two of 32 bits for what the bound of a cell's flux leaves out (shading normals at grazing light).
+_FIXED_UNITS = float(1 << 29)
+# Lights weaker than the group's brightest by more than this are summed in units of their own: a texel of a 256² cube map
+# then still is 2²⁹ / (6 · 256² · 16 · 4) > 20 units.
+_GROUP_RATIO = 16.0
+
+
+def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
+    """Figure 4b, in order."""
+    return [
+        BRDFTables(),
+        LightList(),
+        ShadowMaps(),
+        RSMGeneration(),
+        RadianceInjection(),
+        GBuffer(),
+        TranslucentLayer(),
+        TranslucentBack(),
+        TranslucentTint(),
+        GeometryInjection(),
+        Propagation(settings.bounces),
+        AmbientOcclusion(),
+        AOBlur(),
+        IndirectLighting(),
+        GlossyLighting(),
+        Refraction(),
+        Subsurface(),
+        DirectLighting(),
+        Volumetric(),
+        Resolve(layers),
+    ]
+
+
+# --- the grid ---------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Cubic cells over the scene: ``origin`` (3,) of cell 0's low corner and ``cell`` edge, m; ``size`` (3,) cells."""
+
+    origin: tuple[float, float, float]
+    cell: float
+    size: tuple[int, int, int]
+
+    @staticmethod
+    def over(bounds: np.ndarray, resolution: int) -> Grid:
+        """The grid of ``resolution`` cells along the longest side of ``bounds`` (2, 3), one of padding at each end."""
+        low, high = np.asarray(bounds, "f8")
+        extent = np.maximum(high - low, 0.0)
+        longest = float(extent.max()) or 1.0
+        cell = longest / (resolution - 2)
+        # A side of a whole number of cells must not gain one from rounding.
+        size = np.ceil(extent / cell - 1e-6).astype(int) + 2
+        origin = (low + high) / 2.0 - size * cell / 2.0
+        return Grid(tuple(float(v) for v in origin), cell, tuple(int(v) for v in size))
+
+    @property
+    def cells(self) -> int:
+        return int(np.prod(self.size))
+
+
+def grid(facts: Facts) -> Grid:
+    """The frame's grid."""
+    return Grid.over(facts.rig.bounds, facts.settings.lpv.resolution)
+
+
+def _sh_size(facts: Facts) -> tuple[int, int, int]:
+    nx, ny, nz = grid(facts).size
+    return nx, ny, nz * SH_COUNT
+
+
+_GRID = (
+    Uniform("grid_origin", "vec3", "low corner of the grid, world space, m"),
+    Uniform("grid_cell", "float", "edge of a cell, m"),
+    Uniform("grid_size", "ivec3", "cells along each axis"),
+)
+
+
+def _set_grid(frame: Frame, program, facts: Facts, **more) -> None:
+    g = grid(facts)
+    frame.set(program, grid_origin=g.origin, grid_cell=g.cell, grid_size=g.size, **more)
+
+
+_AIR_SETTINGS = ("use_volumetric", "volume.density", "volume.anisotropy")
+
+
+def _bounce_off(facts: Facts) -> str | None:
+    if not facts.settings.use_indirect_diffuse:
+        return "indirect diffuse is switched off"
+    return "bounces is 0" if facts.settings.bounces == 0 else None
+
+
+# --- ordinates --------------------------------------------------------------------------------------------------------
+
+
+# Quadratures of the sphere that are symmetric under the cube's 48 turns and mirrorings and have no direction within 7° of a plane
+# of the grid: (coordinates of one point, share of 4π) per orbit. Exact to degrees 7 and 9, by Newton's method on the orbits'
+# moments, the widest spaced of the solutions found. Directions along the grid, as in Lebedev's sets, carry the outline of a lit
+# patch across the room unblurred: on the empty Cornell box, 50 of Lebedev's have relMSE .082 and 48 of these .04 at 32³.
+_ORBITS = {
+    48: (((0.25478280537, 0.25478280537, 0.932829804507), 0.49655563),
+         ((0.266270511079, 0.68157905445, 0.68157905445), 0.50344437)),
+    72: (((0.142759509604, 0.142759509604, 0.979407701029), 0.22828848),
+         ((0.256275965365, 0.536578884934, 0.803993613046), 0.77171152)),
+}  # fmt: skip
+
+
+def ordinates(count: int) -> np.ndarray:
+    """Directions and solid angles (count, 4) f4 of one of the quadratures; the solid angles sum to 4π sr."""
+    rows = []
+    for point, share in _ORBITS[count]:
+        places = sorted(set(permutations(point)))
+        found = [np.array(place) * signs for place in places for signs in product((-1.0, 1.0), repeat=3)]
+        rows += [(*w, 4.0 * np.pi * share / len(found)) for w in found]
+    return np.array(rows, "f4")
+
+
+def _batch(facts: Facts) -> int:
+    """Ordinates carried at once."""
+    g = grid(facts)
+    most = min(_BATCH_BYTES // (16 * g.cells), _LEAST_3D_SIZE // g.size[2])
+    return int(np.clip(most, 1, int(facts.settings.lpv.directions)))
+
+
+# --- passes -----------------------------------------------------------------------------------------------------------
+
+
+class RadianceInjection(Pass):
+    """Flux that the RSMs' texels reflect, into the cells in front of them."""
+
+    title = "LPV Radiance Injection"
+    figure = "LPV Radiance Injection"
+    reads = ("rsm.depth", "rsm.normal", "rsm.albedo", "rsm.lights", "rsm.views")
+    writes = (
+        Texture("lpv.source", "lpv_source", "harmonics of the intensity that surfaces send into each cell, over the face of a "
+                "cell, W/(m²·sr)", "rgba32f", _sh_size, access="readwrite"),
+        Buffer("lpv.flux", "lpv_flux", "its sums in fixed point: cell, harmonic, colour", "int", np.dtype("i4"),
+               lambda f: grid(f).cells * SH_COUNT * 3, scratch=True),
+    )  # fmt: skip
+    uniforms = (
+        *_GRID,
+        Uniform("tile", "int", "index of the view whose tile is injected"),
+        Uniform("fixed_scale", "float", "units of fixed point per W"),
+        Uniform("first_group", "int", "1 where the sums are the volume's first"),
+        *MEDIUM_UNIFORMS,
+    )
+    shaders = {
+        "main": {"compute": "engines/lpv/inject_comp.glsl"},
+        "source": {"compute": "engines/lpv/source_comp.glsl"},
+    }
+    depends = ("lights", "world", "transforms", "meshes", "materials")
+    settings = ("lpv.resolution", *_AIR_SETTINGS)
+
+    def rate(self, facts: Facts) -> str:
+        return RSMGeneration().rate(facts)
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return medium_defines(facts)
+
+    def absent(self, facts: Facts) -> str | None:
+        return _bounce_off(facts)
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        facts = planned.facts
+        inject, source = frame.program(planned), frame.program(planned, "source")
+        sample = frame.light_sample(bounce=True)
+        flux = frame.resources["lpv.flux"]
+        set_medium(frame, inject, facts)
+        for first, (scale, lights) in enumerate(fixed_point_groups(sample.lights, grid(facts).cell)):
+            flux.clear()
+            for tile, view in enumerate(sample.views):
+                if int(view["light"]) in lights:
+                    _set_grid(frame, inject, facts, tile=tile, fixed_scale=scale)
+                    frame.compute(planned, inject, (int(view["rect"][2]), int(view["rect"][3])))
+            _set_grid(frame, source, facts, fixed_scale=scale, first_group=int(first == 0))
+            frame.compute(planned, source, _sh_size(facts), (4, 4, 4))
+
+
+def fixed_point_groups(lights: np.ndarray, cell: float) -> list[tuple[float, set[int]]]:
+    """(units per W, indices of LIGHT rows) of lights that may share integer sums: the sum of the fluxes that each can bring
+    into one cell stays below the integers' end, and no light is lost below their unit."""
+    emission = np.abs(lights["emission"]).max(axis=1).astype("f8")
+    directional = np.isin(lights["kind"], (LIGHT_SUN, LIGHT_WORLD))
+    # A lamp: all its power. Parallel light: surfaces that end in one cell lie within three cells of it, and that box shows
+    # the light at most √3 · 9 h² < 16 h² of cross-section.
+    solid_angle = np.where(lights["kind"] == LIGHT_AREA, 2.0 * np.pi, 4.0 * np.pi)
+    bound = np.where(directional, emission * 16.0 * cell * cell, emission * solid_angle)
+    groups: list[tuple[float, set[int]]] = []
+    order = [int(i) for i in np.argsort(-bound, kind="stable") if bound[i] > 0.0]
+    while order:
+        brightest = bound[order[0]]
+        group = [i for i in order if bound[i] * _GROUP_RATIO >= brightest]
+        order = [i for i in order if i not in group]
+        groups.append((_FIXED_UNITS / float(bound[group].sum()), set(group)))
+    return groups
+
+
+class GeometryInjection(Pass):
+    """Which share of the way between neighbouring cells is blocked, by drawing the scene along each axis."""
+
+    title = "LPV Geometry Injection"
+    figure = "Geometry Injection"
+    reads = tuple(Optional(f"brdf.{name}", ("lpv.albedo",)) for name in ("albedo", "average", "energy"))
+    writes = (
+        Buffer("lpv.walls", "lpv_walls", "per cell and axis: blocked share of the way from the cell before, place, normal",
+               "vec4", np.dtype(("f4", (4,))), lambda f: grid(f).cells * 3),
+        Buffer("lpv.faces", "lpv_faces", "per cell and axis: covered points, fragments, sums of their places and normals",
+               "uint", np.dtype("u4"), lambda f: grid(f).cells * 15, scratch=True),
+        Buffer("lpv.albedo", "lpv_albedo", "per cell and axis: mean of albedo over |n|₁ (a float's bits), red, green, blue",
+               "uint", np.dtype("u4"), lambda f: grid(f).cells * 9,
+               when=lambda f: None if f.settings.bounces > 1 else "light bounces once, off what the lights see"),
+        Texture("lpv.raster", "lpv_raster", "what the surfaces are drawn to; nobody reads it", "r8",
+                lambda f: (_POINTS * max(grid(f).size),) * 2, scratch=True),
+    )  # fmt: skip
+    uniforms = (*_GRID, Uniform("axis", "int", "axis that the scene is drawn along"))
+    shaders = {"main": {"compute": "engines/lpv/walls_comp.glsl"}}
+    depends = ("transforms", "meshes", "materials")
+    settings = ("lpv.resolution", "lpv.occlusion", "bounces")
+
+    def rate(self, facts: Facts) -> str:
+        return "static"
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return {"LPV_POINTS": _POINTS}
+
+    def absent(self, facts: Facts) -> str | None:
+        if not facts.settings.lpv.occlusion:
+            return "occlusion is switched off"
+        return None if facts.triangles else "the scene has no surfaces"
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        facts = planned.facts
+        g = grid(facts)
+        ctx = frame.gl.ctx
+        reflect = planned.has("lpv.albedo")
+        for name in ("lpv.faces", "lpv.albedo") if reflect else ("lpv.faces",):
+            frame.resources[name].clear()
+        fbo = frame.targets(planned)
+        fbo.use()
+        fbo.scissor = None
+        ctx.enable_only(moderngl.NOTHING)
+        frame.bind(planned)
+        stages = {"vertex": "surface/surface_vert.glsl", "fragment": "engines/lpv/geometry_frag.glsl"}
+        options = {
+            "full": reflect, "units": len(planned.texture_reads()), "defines": {
+                "SURFACE_TABLES": 2 if planned.has("brdf.average") else 0, "SURFACE_SEE_THROUGH_GLASS": 1,
+                "SURFACE_SEEN_BY_CAMERA": 0, "SURFACE_SEEN_BY_SHADOW": 1,
+            },
+        }  # fmt: skip
+        programs = frame.gpu.programs(planned, stages, SHADOW, **options)
+        for axis in range(3):
+            u, v = (axis + 1) % 3, (axis + 2) % 3
+            fbo.viewport = (0, 0, _POINTS * g.size[u], _POINTS * g.size[v])
+            clip = np.zeros((4, 4))
+            for row, k in enumerate((u, v, axis)):
+                scale = 2.0 / (g.size[k] * g.cell)
+                clip[row, k], clip[row, 3] = scale, -1.0 - scale * g.origin[k]
+            clip[3, 3] = 1.0
+            for program in programs:
+                _set_grid(frame, program, facts, axis=axis)
+            frame.gpu.draw(planned, stages, SHADOW, np.ascontiguousarray(clip.T, "f4"), **options)
+        ctx.memory_barrier(moderngl.ALL_BARRIER_BITS)
+        program = frame.program(planned)
+        _set_grid(frame, program, facts)
+        frame.compute(planned, program, g.size, (4, 4, 4))
+
+
+class Propagation(Pass):
+    """Light carried from cell to cell along each ordinate, and its harmonics in every cell."""
+
+    title = "LPV Propagation"
+    figure = "LPV Propagation"
+    writes = (
+        Texture("lpv.volume", "lpv_volume", "harmonics of the radiance in each cell by direction of travel, W/(m²·sr)",
+                "rgba32f", _sh_size, access="readwrite"),
+        Texture("lpv.radiance", "lpv_radiance", "radiance along each ordinate of a batch, W/(m²·sr)", "rgba32f",
+                lambda f: (*grid(f).size[:2], grid(f).size[2] * _batch(f)), access="readwrite", scratch=True),
+        Buffer("lpv.ordinates", "ordinates", "unit vectors and solid angles", "vec4", np.dtype(("f4", (4,))),
+               lambda f: int(f.settings.lpv.directions), scratch=True),
+    )  # fmt: skip
+    uniforms = (
+        *_GRID,
+        Uniform("batch_first", "int", "index of the batch's first ordinate"),
+        Uniform("batch_count", "int", "ordinates in the batch"),
+        Uniform("fixed_scale", "float", "units of fixed point per W"),
+        Uniform("bounced", "int", "1 to start from what the walls reflect too"),
+        Uniform("medium_extinction", "vec3", "share of light lost per metre of the air"),
+        Uniform("medium_scattering", "vec3", "share of light scattered per metre"),
+        Uniform("medium_anisotropy", "float", "mean cosine of the scattering angle"),
+        Uniform("wave", "int", "the diagonal plane whose cells take their light"),
+    )
+    shaders = {
+        "expand": {"compute": "engines/lpv/expand_comp.glsl"},
+        "main": {"compute": "engines/lpv/propagate_comp.glsl"},
+        "gather": {"compute": "engines/lpv/gather_comp.glsl"},
+        "reflect": {"compute": "engines/lpv/reflect_comp.glsl"},
+        "bounced": {"compute": "engines/lpv/bounced_comp.glsl"},
+    }
+    depends = ("lights", "world", "transforms", "meshes", "materials")
+    settings = ("lpv.resolution", "lpv.directions", "lpv.occlusion", "bounces", *_AIR_SETTINGS)
+
+    def __init__(self, bounces: int = 1) -> None:
+        self.reads = ("lpv.source", Optional("lpv.walls"))
+        if bounces > 1:
+            self.reads += (Optional("lpv.albedo"),)
+            self.writes += (
+                Texture("lpv.bounced", "lpv_bounced", "lpv.source and what the walls reflect of the volume's light", "rgba32f",
+                        _sh_size, access="readwrite", scratch=True),
+                Buffer("lpv.reflected", "lpv_reflected", "what the walls reflect in fixed point: cell, harmonic, colour", "int",
+                       np.dtype("i4"), lambda f: grid(f).cells * SH_COUNT * 3, scratch=True),
+            )  # fmt: skip
+
+    def rate(self, facts: Facts) -> str:
+        return RSMGeneration().rate(facts)
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return {"HAS_LPV_BOUNCED": int(facts.settings.bounces > 1), **medium_defines(facts)}
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        facts = planned.facts
+        g = grid(facts)
+        table = ordinates(int(facts.settings.lpv.directions))
+        frame.upload("lpv.ordinates", table)
+        filled = air(facts)
+        if filled is not None:
+            medium = filled.medium
+            for key in ("main", "bounced") if planned.has("lpv.albedo") else ("main",):
+                frame.set(
+                    frame.program(planned, key),
+                    medium_extinction=tuple(float(v) for v in medium.extinction),
+                    medium_scattering=tuple(float(v) for v in medium.scattering), medium_anisotropy=float(medium.anisotropy),
+                )  # fmt: skip
+        self._carry(frame, planned, table, bounced=False)
+        if planned.has("lpv.albedo"):
+            reflect, bounced = frame.program(planned, "reflect"), frame.program(planned, "bounced")
+            # Passive walls bring back less than came: the sum of all lights' bounds holds for every bounce.
+            groups = fixed_point_groups(frame.light_sample(bounce=True).lights, g.cell)
+            scale = 1.0 / sum(1.0 / group_scale for group_scale, _ in groups)
+            for _ in range(facts.settings.bounces - 1):
+                frame.resources["lpv.reflected"].clear()
+                _set_grid(frame, reflect, facts, fixed_scale=scale)
+                frame.compute(planned, reflect, g.size, (4, 4, 4))
+                _set_grid(frame, bounced, facts, fixed_scale=scale)
+                frame.compute(planned, bounced, _sh_size(facts), (4, 4, 4))
+                self._carry(frame, planned, table, bounced=True)
+
+    @staticmethod
+    def _carry(frame: Frame, planned: Planned, table: np.ndarray, *, bounced: bool) -> None:
+        """Fill the volume from the sources: the first ones, or those that a bounce was added to."""
+        facts = planned.facts
+        g = grid(facts)
+        expand, carry, gather = (frame.program(planned, k) for k in ("expand", "main", "gather"))
+        size = _batch(facts)
+        for first in range(0, len(table), size):
+            count = min(size, len(table) - first)
+            _set_grid(frame, expand, facts, batch_first=first, batch_count=count, bounced=int(bounced))
+            frame.compute(planned, expand, (*g.size[:2], g.size[2] * count), (4, 4, 4))
+            _set_grid(frame, carry, facts, batch_first=first, batch_count=count)
+            for wave in range(sum(g.size) - 2):
+                carry["wave"].value = wave
+                carry.run(-(-g.size[0] // 8), -(-g.size[1] // 8), count)
+                frame.gl.ctx.memory_barrier(moderngl.SHADER_IMAGE_ACCESS_BARRIER_BIT)
+            _set_grid(frame, gather, facts, batch_first=first, batch_count=count)
+            frame.compute(planned, gather, g.size, (4, 4, 4))
+
+
+class IndirectLighting(Pass):
+    """The volume looked up at each pixel."""
+
+    title = "LPV Lighting Computation"
+    figure = "LPV Lighting Computation"
+    reads = ("lpv.volume", Optional("lpv.walls"), "gbuffer.depth", "gbuffer.normal")
+    writes = (
+        Texture("indirect.diffuse", "indirect_diffuse", "radiance a white Lambert surface would reflect, W/(m²·sr)",
+                "rgba32f", _screen, when=lambda f: None if f.diffuse else "no visible material is diffuse"),
+    )  # fmt: skip
+    uniforms = _GRID
+    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/lpv/lighting_frag.glsl"}}
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        program = frame.program(planned)
+        _set_grid(frame, program, planned.facts)
+        frame.screen(planned, program)
+
+
+def _march_steps(facts: Facts) -> int:
+    """Faces that a ray through the grid can pass."""
+    return int(sum(grid(facts).size))
+
+
+class AmbientOcclusion(Pass):
+    """Rays through the geometry volume."""
+
+    title = "LPV AO Generation"
+    figure = "AO Generation"
+    reads = ("lpv.walls", "gbuffer.depth", "gbuffer.normal")
+    writes = (
+        Texture("ao.raw", "ao_raw", "cosine-weighted share of directions free of occluders within the AO distance; 1",
+                "rg16f", _screen, scratch=True),
+    )  # fmt: skip
+    uniforms = (
+        *_GRID,
+        Uniform("ao_directions", "int", "rays per pixel"),
+        Uniform("ao_distance", "float", "how far an occluder counts, m"),
+    )
+    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/lpv/ao_frag.glsl"}}
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return {"MARCH_STEPS": _march_steps(facts), "MARCH_LIGHT": 0, "HAS_LPV_WALLS": 1}
+
+    def absent(self, facts: Facts) -> str | None:
+        return None if facts.settings.use_ao else "ambient occlusion is switched off"
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        program = frame.program(planned)
+        ao = planned.facts.settings.ao
+        _set_grid(frame, program, planned.facts, ao_directions=ao.samples, ao_distance=planned.facts.ao_distance)
+        frame.screen(planned, program)
+
+
+class GlossyLighting(Pass):
+    """Rays of the glossy lobe through the volume."""
+
+    title = "LPV Glossy Computation"
+    figure = "LPV Lighting Computation"
+    reads = (
+        "lpv.volume", "lpv.walls", "gbuffer.depth", "gbuffer.normal", "gbuffer.specular", "gbuffer.lobe", "brdf.energy",
+        "brdf.average",
+    )  # fmt: skip
+    writes = (
+        Texture("indirect.glossy", "indirect_glossy", "radiance that the glossy lobe reflects, W/(m²·sr)", "rgba32f", _screen),
+    )
+    uniforms = (*_GRID, Uniform("glossy_rays", "int", "rays per pixel"))
+    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/lpv/glossy_frag.glsl"}}
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return {"MARCH_STEPS": _march_steps(facts), "MARCH_LIGHT": 1, "HAS_LPV_WALLS": 1}
+
+    def absent(self, facts: Facts) -> str | None:
+        if not facts.settings.use_glossy:
+            return "glossy reflections are switched off"
+        return None if facts.glossy else "no visible material is glossy"
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        program = frame.program(planned)
+        _set_grid(frame, program, planned.facts, glossy_rays=planned.facts.settings.lpv.glossy_rays)
+        frame.screen(planned, program)
+
+
+class Refraction(Pass):
+    """A refracted ray per pixel through the volume."""
+
+    title = "LPV Translucency"
+    figure = "LPV Lighting Computation"
+    reads = (
+        "lpv.volume", "lpv.walls", "gbuffer.transmission", "translucent.depth", "translucent.normal",
+        "translucent.color", "translucent.medium", "translucent.back_depth", "translucent.back_normal",
+    )  # fmt: skip
+    writes = (
+        Texture("transmission.indirect", "transmission_indirect", "radiance through refracting surfaces, tinted; alpha 1 "
+                "where the ray met a wall", "rgba32f", _screen),
+    )  # fmt: skip
+    uniforms = _GRID
+    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/lpv/refraction_frag.glsl"}}
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return {"MARCH_STEPS": _march_steps(facts), "MARCH_LIGHT": 1, "HAS_LPV_WALLS": 1}
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        program = frame.program(planned)
+        _set_grid(frame, program, planned.facts)
+        frame.screen(planned, program)

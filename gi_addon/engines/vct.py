@@ -1,0 +1,410 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Voxel cone tracing, Figure 4c of the paper.
+
+C. Crassin, F. Neyret, M. Sainz, S. Green and E. Eisemann, "Interactive Indirect Illumination Using Voxel Cone Tracing",
+Pacific Graphics 2011. The scene becomes a grid of cells that know what they block and what light leaves them, by
+direction; whatever a surface needs to know of the rest of the scene is gathered by cones through that grid.
+"""
+
+from __future__ import annotations
+
+from ..facts import Facts
+from ..frame import Frame
+from ..graph import Optional, Pass, Planned, Texture, Uniform
+from ..passes.brdf_tables import BRDFTables
+from ..passes.direct_lighting import DirectLighting
+from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint, _screen, gather_size
+from ..passes.lights import LightList, RSMGeneration, ShadowMaps
+from ..passes.occupancy import Occupancy
+from ..passes.resolve import Resolve
+from ..passes.volumetric import MEDIUM_UNIFORMS, Volumetric, medium_defines, set_medium
+from ..passes.voxels import GRID_UNIFORMS, VoxelGrid, Voxelisation, voxel_grid
+from ..passes.world_guide import WorldGuide
+from ..settings import Settings
+from .rsm import Subsurface
+
+_FULLSCREEN = "passes/fullscreen_vert.glsl"
+
+
+def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
+    """Figure 4c, in order."""
+    return [
+        BRDFTables(),
+        Occupancy(),
+        WorldGuide(),
+        LightList(),
+        *([] if settings.vct.shadow_cones else [ShadowMaps()]),
+        RSMGeneration(),
+        Voxelisation(),
+        VoxelCoverage(),
+        RadianceInjection(),
+        GBuffer(),
+        TranslucentLayer(),
+        TranslucentBack(),
+        TranslucentTint(),
+        GBufferMips(),
+        VoxelAO(),
+        InterpolatedIndirect(),
+        IndirectLighting(),
+        GlossyCones(),
+        *([ShadowCones()] if settings.vct.shadow_cones else []),
+        Subsurface(),
+        DirectLighting(),
+        RefractionCones(),
+        VoxelVolumetric(),
+        Resolve(layers),
+    ]
+
+
+def _bounce_off(facts: Facts) -> str | None:
+    if not facts.settings.use_indirect_diffuse:
+        return "indirect diffuse is switched off"
+    if facts.settings.bounces == 0:
+        return "bounces is 0"
+    return None if facts.lit or facts.glowing_voxels else "no light shines"
+
+
+def _one_bounce(facts: Facts) -> str | None:
+    return None if facts.settings.bounces > 1 and facts.settings.use_indirect_diffuse else "one bounce needs no other"
+
+
+def _atlas(facts: Facts) -> tuple[int, int, int]:
+    """Six parts, two sides by three axes."""
+    x, y, z = voxel_grid(facts).size
+    return (2 * x, y, 3 * z)
+
+
+class VoxelCoverage(Pass):
+    """How much of a cell's faces its surfaces cover, and which way they face, at every mip."""
+
+    title = "Voxel Coverage"
+    reads = ("voxels.area", "voxels.normal")
+    writes = (
+        Texture("vct.coverage", "voxel_coverage", "share of a cell face that opaque surfaces cover, along x, y, z",
+                "rgba16f", lambda f: voxel_grid(f).size, mips=lambda f: voxel_grid(f).levels, scratch=True),
+        Texture("vct.facing", "voxel_facing", "which way fronts face, −1 … 1 along x, y, z: 0 where they face apart",
+                "rgba16f", lambda f: voxel_grid(f).size, mips=lambda f: voxel_grid(f).levels, scratch=True),
+        Texture("vct.opacity", "voxel_opacity", "optical depth of crossing the cell along x, y, z, over 5", "rgba16f",
+                lambda f: voxel_grid(f).size, mips=lambda f: voxel_grid(f).levels, filter="linear", scratch=True),
+    )  # fmt: skip
+    uniforms = (
+        Uniform("size", "ivec3", "cells of the level that is made"),
+        Uniform("level", "int", "which level that is"),
+    )
+    shaders = {
+        "main": {"compute": "engines/vct/coverage_comp.glsl"},
+        "mips": {"compute": "engines/vct/coverage_mips_comp.glsl"},
+        "opacity": {"compute": "engines/vct/opacity_comp.glsl"},
+    }
+    depends = Voxelisation.depends
+    settings = Voxelisation.settings
+
+    def rate(self, facts: Facts) -> str:
+        return Voxelisation().rate(facts)
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        grid = voxel_grid(planned.facts)
+        program = frame.program(planned)
+        frame.set(program, size=grid.size)
+        frame.compute(planned, program, grid.size, (4, 4, 4))
+        program = frame.program(planned, "mips")
+        coverage, facing, opacity = (frame.resources[f"vct.{name}"] for name in ("coverage", "facing", "opacity"))
+        size = grid.size
+        for level in range(grid.levels):
+            size = tuple(n // 2 for n in size)
+            for k, volume in enumerate((coverage, facing)):
+                volume.bind_to_image(3 + 2 * k, read=True, write=False, level=level)
+                volume.bind_to_image(4 + 2 * k, read=False, write=True, level=level + 1)
+            frame.set(program, size=size)
+            program.run(*(-(-n // 4) for n in size))
+            frame.gl.ctx.memory_barrier()
+        program = frame.program(planned, "opacity")
+        coverage.use(2)
+        size = grid.size
+        for level in range(grid.levels + 1):
+            opacity.bind_to_image(3, read=False, write=True, level=level)
+            frame.set(program, size=size, level=level)
+            program.run(*(-(-n // 4) for n in size))
+            size = tuple(n // 2 for n in size)
+        frame.gl.ctx.memory_barrier()
+
+
+class RadianceInjection(Pass):
+    """Light that leaves the cells, and the directional mips of it."""
+
+    title = "Voxel Radiance Injection"
+    figure = "Voxel Radiance Injection, Voxel Anisotropic Mipmap Generation"
+    reads = (
+        "vct.coverage", "vct.facing", "vct.opacity", "voxels.albedo", Optional("voxels.emission"),
+        Optional("rsm.depth"), Optional("rsm.albedo"), Optional("rsm.normal"), Optional("rsm.lights"), Optional("rsm.views"),
+    )  # fmt: skip
+    writes = (
+        Texture("vct.radiance", "voxel_radiance", "by side and axis: radiance × alpha, W/(m²·sr), of surfaces whose fronts "
+                "face that way; alpha, their share of vct.opacity", "rgba16f", _atlas, mips=lambda f: voxel_grid(f).levels,
+                filter="linear", scratch=True),
+        Texture("vct.back", "voxel_back", "radiance × alpha, W/(m²·sr), that leaves surfaces by their backs; alpha, the sum of "
+                "vct.opacity", "rgba16f", lambda f: voxel_grid(f).size, mips=lambda f: voxel_grid(f).levels,
+                filter="linear", scratch=True),
+        Texture("vct.bounce", "voxel_bounce", "by side and axis: radiance of the later bounces, W/(m²·sr)", "rgba16f",
+                _atlas, when=_one_bounce, scratch=True),
+        Texture("vct.bounce_back", "voxel_bounce_back", "the same by the surfaces' backs", "rgba16f",
+                lambda f: voxel_grid(f).size, when=_one_bounce, scratch=True),
+    )  # fmt: skip
+    uniforms = (
+        *GRID_UNIFORMS,
+        Uniform("grid_levels", "float", "mips above the cells"),
+        Uniform("cone_count", "int", "cones that each cell gathers by"),
+        Uniform("view_count", "int", "reflective shadow maps in the list"),
+        Uniform("first_time", "int", "1 when empty cells are due too"),
+        Uniform("add_bounce", "int", "1 when later bounces are known"),
+        *MEDIUM_UNIFORMS,
+    )
+    shaders = {
+        "main": {"compute": "engines/vct/inject_comp.glsl"},
+        "bounce": {"compute": "engines/vct/bounce_comp.glsl"},
+        "mips": {"compute": "engines/vct/mips_comp.glsl"},
+    }
+    depends = ("lights", "world", "transforms", "meshes", "materials")
+    settings = ("vct.resolution", "vct.emissive_voxels", "vct.cones", "bounces", "use_area_lights")
+
+    def rate(self, facts: Facts) -> str:
+        return RSMGeneration().rate(facts) if facts.rig.bounce.sizes else "static"
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return medium_defines(facts)
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        grid = voxel_grid(planned.facts)
+        program = frame.program(planned)
+        values = {
+            "view_count": len(planned.facts.rig.bounce.sizes), "first_time": int(planned.stale),
+            "grid_levels": float(grid.levels), "cone_count": planned.facts.settings.vct.cones, **grid.uniforms(),
+        }  # fmt: skip
+        again = planned.facts.settings.bounces - 1 if planned.has("vct.bounce") else 0
+        for k in range(again + 1):
+            if k:
+                self._bounce(frame, planned, grid, values)
+                frame.resources["vct.bounce"].use(12)
+                frame.resources["vct.bounce_back"].use(13)
+            frame.set(program, add_bounce=int(k > 0), **values)
+            set_medium(frame, program, planned.facts)
+            frame.compute(planned, program, grid.size, (4, 4, 4))
+            build_mips(frame, planned, grid)
+
+    @staticmethod
+    def _bounce(frame: Frame, planned: Planned, grid: VoxelGrid, values: dict) -> None:
+        """Gather what the voxels hold into vct.bounce."""
+        program = frame.program(planned, "bounce")
+        frame.resources["vct.radiance"].use(12)
+        frame.resources["vct.back"].use(13)
+        frame.set(program, **values)
+        frame.compute(planned, program, grid.size, (4, 4, 4))
+
+
+def build_mips(frame: Frame, planned: Planned, grid: VoxelGrid) -> None:
+    """The levels of the light volumes above their cells."""
+    program = frame.program(planned, "mips")
+    size = grid.size
+    for level in range(grid.levels):
+        size = tuple(n // 2 for n in size)
+        for k, name in enumerate(("vct.radiance", "vct.back")):
+            frame.resources[name].bind_to_image(4 + 2 * k, read=True, write=False, level=level)
+            frame.resources[name].bind_to_image(5 + 2 * k, read=False, write=True, level=level + 1)
+        frame.set(program, coarse_size=size, coarse_level=level + 1)
+        program.run(*(-(-n // 4) for n in size))
+        frame.gl.ctx.memory_barrier()
+
+
+# What cones read.
+_VOLUMES = ("vct.radiance", "vct.back", "vct.opacity", "vct.facing")
+_CONE_UNIFORMS = (
+    *GRID_UNIFORMS,
+    Uniform("grid_levels", "float", "mips above the cells"),
+    Uniform("cone_count", "int", "cones per point and sub-frame"),
+    Uniform("cone_sets", "float", "sub-frames, whose sets of cones share the hemisphere"),
+)
+
+
+def _set_cones(frame: Frame, program, facts: Facts) -> None:
+    grid = voxel_grid(facts)
+    frame.set(
+        program, **grid.uniforms(), grid_levels=float(grid.levels), cone_count=facts.settings.vct.cones,
+        cone_sets=float(facts.subframes),
+    )  # fmt: skip
+
+
+class InterpolatedIndirect(Pass):
+    """Indirect light at one pixel per block."""
+
+    title = "Voxel Interpolated Indirect Lighting Computation"
+    reads = (*_VOLUMES, "gbuffer.low_depth", "gbuffer.low_normal", "gbuffer.low_pixel")
+    writes = (
+        Texture("indirect.low", "low_indirect", "radiance a white Lambert surface would reflect, W/(m²·sr)", "rgba32f",
+                gather_size, scratch=True),
+        Texture("indirect.low_direction", "low_direction", "Σ luminance × direction, and Σ luminance, of what arrives",
+                "rgba32f", gather_size, scratch=True),
+    )  # fmt: skip
+    uniforms = _CONE_UNIFORMS
+    shaders = {"main": {"vertex": _FULLSCREEN, "fragment": "engines/vct/gather_low_frag.glsl"}}
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return {"GATHER_SCALE": facts.settings.gather_scale}
+
+    def absent(self, facts: Facts) -> str | None:
+        if facts.settings.gather_scale == 1:
+            return "every pixel gathers for itself"
+        return _bounce_off(facts)
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        program = frame.program(planned)
+        _set_cones(frame, program, planned.facts)
+        frame.screen(planned, program)
+
+
+class IndirectLighting(Pass):
+    """Indirect light of every pixel: interpolated where the low resolution has its surface, by cones where not."""
+
+    title = "Voxel Lighting Computation"
+    figure = "Voxel Lighting Computation"
+    reads = (
+        *_VOLUMES, "gbuffer.depth", "gbuffer.normal", Optional("gbuffer.low_depth"), Optional("gbuffer.low_normal"),
+        Optional("gbuffer.low_pixel"), Optional("indirect.low"), Optional("indirect.low_direction"),
+    )  # fmt: skip
+    writes = (
+        Texture("indirect.diffuse", "indirect_diffuse", "radiance a white Lambert surface would reflect, W/(m²·sr)",
+                "rgba32f", _screen, when=lambda f: None if f.diffuse else "no visible material is diffuse"),
+    )  # fmt: skip
+    uniforms = _CONE_UNIFORMS
+    shaders = {"main": {"vertex": _FULLSCREEN, "fragment": "engines/vct/lighting_frag.glsl"}}
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return {"GATHER_SCALE": facts.settings.gather_scale}
+
+    def absent(self, facts: Facts) -> str | None:
+        return _bounce_off(facts)
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        program = frame.program(planned)
+        _set_cones(frame, program, planned.facts)
+        frame.screen(planned, program)
+
+
+class VoxelAO(Pass):
+    """Ambient occlusion by short cones."""
+
+    title = "Voxel Ambient Occlusion"
+    figure = "Voxel Lighting Computation"
+    reads = (*_VOLUMES, "gbuffer.depth", "gbuffer.normal")
+    writes = (
+        Texture("ao", "ao", "ambient occlusion within the AO distance; 1; 1 = open", "rg16f", _screen),
+    )  # fmt: skip
+    uniforms = (*_CONE_UNIFORMS, Uniform("ao_distance", "float", "how far an occluder counts, m"))
+    shaders = {"main": {"vertex": _FULLSCREEN, "fragment": "engines/vct/ao_frag.glsl"}}
+
+    def absent(self, facts: Facts) -> str | None:
+        return None if facts.settings.use_ao else "ambient occlusion is switched off"
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        program = frame.program(planned)
+        _set_cones(frame, program, planned.facts)
+        frame.set(program, ao_distance=min(planned.facts.ao_distance, 2.0 * planned.facts.radius))
+        frame.screen(planned, program)
+
+
+class GlossyCones(Pass):
+    """What glossy surfaces mirror: one cone a sub-frame, as wide as the lobe's share."""
+
+    title = "Voxel Glossy Reflections"
+    figure = "Voxel Lighting Computation"
+    reads = (
+        *_VOLUMES, "gbuffer.depth", "gbuffer.normal", "gbuffer.specular", "gbuffer.lobe", "brdf.energy", "brdf.average",
+    )  # fmt: skip
+    writes = (
+        Texture("indirect.glossy", "indirect_glossy", "radiance reflected by the glossy lobe, with its colour, W/(m²·sr)",
+                "rgba32f", _screen),
+    )  # fmt: skip
+    uniforms = _CONE_UNIFORMS
+    shaders = {"main": {"vertex": _FULLSCREEN, "fragment": "engines/vct/glossy_frag.glsl"}}
+
+    def absent(self, facts: Facts) -> str | None:
+        if not facts.settings.use_glossy:
+            return "glossy reflections are switched off"
+        if not facts.glossy:
+            return "no visible material is glossy"
+        return _bounce_off(facts)
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        program = frame.program(planned)
+        _set_cones(frame, program, planned.facts)
+        frame.screen(planned, program)
+
+
+class ShadowCones(Pass):
+    """Shadows by one cone a light, as wide as the light looks."""
+
+    title = "Voxel Shadow Cones"
+    figure = "Voxel Lighting Computation"
+    reads = (*_VOLUMES, "lights", "gbuffer.depth", "gbuffer.normal")
+    writes = (
+        Texture("shadow.cones", "shadow_cones", "share of each light that reaches the surface", "r16f",
+                lambda f: (*f.resolution, max(1, len(f.rig.sources))), layers=True),
+    )  # fmt: skip
+    uniforms = (*_CONE_UNIFORMS, Uniform("light_count", "int", "lights in the list"))
+    shaders = {"main": {"compute": "engines/vct/shadow_comp.glsl"}}
+
+    def absent(self, facts: Facts) -> str | None:
+        if not facts.settings.use_shadows:
+            return "shadows are switched off"
+        return None if facts.lit else "no light shines"
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        program = frame.program(planned)
+        _set_cones(frame, program, planned.facts)
+        frame.set(program, light_count=len(planned.facts.rig.sources))
+        frame.compute(planned, program, planned.facts.resolution)
+
+
+class RefractionCones(Pass):
+    """What is seen through refracting and translucent surfaces, by cones."""
+
+    title = "Voxel Translucency"
+    figure = "Voxel Lighting Computation"
+    reads = (
+        *_VOLUMES, "gbuffer.transmission", "translucent.depth", "translucent.normal", "translucent.color",
+        "translucent.medium", "translucent.back_depth", "translucent.back_normal",
+    )  # fmt: skip
+    writes = (
+        Texture("transmission.indirect", "transmission_indirect", "radiance through refracting surfaces, tinted; alpha 1 "
+                "where the cone met something", "rgba32f", _screen),
+    )  # fmt: skip
+    uniforms = _CONE_UNIFORMS
+    shaders = {"main": {"vertex": _FULLSCREEN, "fragment": "engines/vct/refraction_frag.glsl"}}
+
+    def absent(self, facts: Facts) -> str | None:
+        return _bounce_off(facts)
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        program = frame.program(planned)
+        _set_cones(frame, program, planned.facts)
+        frame.screen(planned, program)
+
+
+class VoxelVolumetric(Volumetric):
+    """Light in the air, blocked by voxels."""
+
+    title = "Voxel Volumetric Light"
+    reads = (
+        Optional("lights", ("volume.light",)), Optional("gbuffer.depth"), *(Optional(v, ("volume.light",)) for v in _VOLUMES),
+    )  # fmt: skip
+    uniforms = (*Volumetric.uniforms, *_CONE_UNIFORMS)
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        # Without shadows nothing blocks.
+        return {
+            "RADIAL_BLUR": 0, "VOXEL_VISIBILITY": int(facts.settings.use_shadows and facts.triangles > 0),
+            "HAS_LIGHT_VIEWS": 0, "HAS_SHADOW_DEPTH": 0, "HAS_RSM_DEPTH": 0,
+        }  # fmt: skip
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        _set_cones(frame, frame.program(planned), planned.facts)
+        super().run(frame, planned)

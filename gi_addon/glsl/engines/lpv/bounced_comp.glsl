@@ -1,0 +1,25 @@
+// The volume's sources of the next round: the lights' own first bounce, and what the walls reflect and the air scatters of all
+// light so far.
+
+#include "engines/lpv/lpv_lib.glsl"
+
+layout(local_size_x = 4, local_size_y = 4, local_size_z = 4) in;
+
+void main()
+{
+    ivec3 at = ivec3(gl_GlobalInvocationID); // z: cell and coefficient
+    if (any(greaterThanEqual(at, grid_size * ivec3(1, 1, SH_COUNT)))) {
+        return;
+    }
+    int coefficient = at.z / grid_size.z;
+    int base = (cell_index(ivec3(at.xy, at.z - coefficient * grid_size.z), grid_size) * SH_COUNT + coefficient) * 3;
+    vec3 reflected = vec3(lpv_reflected[base], lpv_reflected[base + 1], lpv_reflected[base + 2]);
+    vec3 sum = texelFetch(lpv_source, at, 0).rgb + reflected / (fixed_scale * grid_cell * grid_cell);
+#if HAS_MEDIUM
+    // Q/h² = h³ σs ∫ p L dω / h². Henyey and Greenstein's phase function scales harmonics of order l by g^l.
+    float order = coefficient == 0 ? 0.0 : coefficient < 4 ? 1.0 : 2.0;
+    float phase = order == 0.0 ? 1.0 : pow(abs(medium_anisotropy), order) * (order == 1.0 ? sign(medium_anisotropy) : 1.0);
+    sum += medium_scattering * (grid_cell * phase) * imageLoad(lpv_volume, at).rgb;
+#endif
+    imageStore(lpv_bounced, at, vec4(sum, 0.0));
+}

@@ -1,0 +1,29 @@
+// Harmonics of the radiance in each cell, ∫ L Y dω, by the ordinates' quadrature.
+
+#include "engines/lpv/lpv_lib.glsl"
+
+layout(local_size_x = 4, local_size_y = 4, local_size_z = 4) in;
+
+void main()
+{
+    ivec3 cell = ivec3(gl_GlobalInvocationID);
+    if (!inside_grid(cell, grid_size)) {
+        return;
+    }
+    vec3 sum[SH_COUNT];
+    for (int c = 0; c < SH_COUNT; ++c) {
+        sum[c] = batch_first == 0 ? vec3(0.0) : imageLoad(lpv_volume, cell + ivec3(0, 0, c * grid_size.z)).rgb;
+    }
+    for (int i = 0; i < batch_count; ++i) {
+        vec3 value = imageLoad(lpv_radiance, cell + ivec3(0, 0, i * grid_size.z)).rgb;
+        vec4 ordinate = ordinates[batch_first + i];
+        float y[SH_COUNT];
+        sh_basis(ordinate.xyz, y);
+        for (int c = 0; c < SH_COUNT; ++c) {
+            sum[c] += value * (ordinate.w * y[c]);
+        }
+    }
+    for (int c = 0; c < SH_COUNT; ++c) {
+        imageStore(lpv_volume, cell + ivec3(0, 0, c * grid_size.z), vec4(sum[c], 0.0));
+    }
+}

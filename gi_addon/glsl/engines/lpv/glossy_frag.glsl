@@ -1,0 +1,56 @@
+// Glossy reflections from the volume: rays of the lobe's visible normals, each carried through the grid to the wall it meets
+// (A. Kaplanyan, "Light Propagation Volumes in CryEngine 3", SIGGRAPH course 2009, sums harmonics along the one mirrored ray;
+// paper §V). Lights, emissive surfaces and the world as mirrored are direct light, as in Cycles, and not in here.
+//
+// A ray drawn by the visible normals (E. Heitz 2018) weighs F G2/G1, whatever the roughness.
+
+#include "lib/view_lib.glsl"
+#include "lib/bsdf_lib.glsl"
+#include "lib/sequence_lib.glsl"
+#include "engines/lpv/geometry_lib.glsl"
+#include "engines/lpv/march_lib.glsl"
+
+void main()
+{
+    ivec2 pixel = ivec2(gl_FragCoord.xy);
+    vec2 uv = gl_FragCoord.xy * view.inverse_resolution;
+    float depth = texelFetch(gbuf_depth, pixel, 0).r;
+    indirect_glossy = vec4(0.0);
+    if (depth <= 0.0) {
+        return;
+    }
+    vec4 specular = texelFetch(gbuf_specular, pixel, 0);
+    vec4 packed_lobe = texelFetch(gbuf_lobe, pixel, 0);
+    Lobe lobe = Lobe(specular.rgb, packed_lobe.g, specular.a, packed_lobe.r, packed_lobe.b);
+    if (max3(lobe.f0) <= 0.0 && lobe.f90 <= 0.0) {
+        return;
+    }
+    vec3 position_ws = position_ws_from_depth(uv, depth);
+    vec4 normals = texelFetch(gbuf_normal, pixel, 0);
+    vec3 n = octahedral_decode(normals.xy);
+    vec3 ng = octahedral_decode(normals.zw);
+    vec3 v = view_direction_ws(uv);
+    mat3 frame = frame_from_normal(n);
+    vec3 v_local = v * frame;
+    v_local.z = max(v_local.z, 1e-4); // shading normals can face away from the eye
+    float alpha = max(sqr(lobe.roughness), ALPHA_MIN);
+    vec3 from = (position_ws - grid_origin) / grid_cell + ng * half_cell_shift(ng);
+    // Each pixel turns the sequence by its own number (R. Cranley and T. Patterson, 1976).
+    uint seed = hash_u32(uvec2(pixel + view.pixel_offset));
+    vec2 turn = vec2(unit_float(seed), unit_float(hash_u32(seed)));
+    vec3 sum = vec3(0.0);
+    for (int i = 0; i < glossy_rays; ++i) {
+        vec2 u = fract(sobol_2d(view.subframe * uint(glossy_rays) + uint(i), 40u) + turn);
+        vec3 h = ggx_sample_visible_normal(v_local, alpha, u);
+        vec3 l_local = reflect(-v_local, h);
+        vec3 l = frame * l_local;
+        if (l_local.z <= 0.0 || dot(l, ng) <= 0.0) {
+            continue;
+        }
+        float lambda_v = ggx_lambda(v_local.z, alpha);
+        float g2_g1 = (1.0 + lambda_v) / (1.0 + lambda_v + ggx_lambda(l_local.z, alpha));
+        sum += fresnel(lobe, saturate(dot(v_local, h))) * g2_g1 * march_walls(from, l, 1e9).radiance;
+    }
+    vec3 gain = multiscatter_gain(brdf_energy, brdf_average, lobe, saturate(abs(dot(n, v))));
+    indirect_glossy = vec4(gain * sum / float(glossy_rays), 1.0);
+}

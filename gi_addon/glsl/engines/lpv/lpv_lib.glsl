@@ -1,0 +1,35 @@
+// The light propagation volume: its grid and its spherical harmonics.
+//
+// Cell (i, j, k) spans [i, i+1) × … in grid coordinates, which are (world − origin) / cell. A volume of spherical harmonics
+// is one 3D texture: coefficient c of cell z lies at depth z + c · grid_size.z.
+
+#include "lib/math_lib.glsl"
+
+const int SH_COUNT = 9; // orders 0, 1, 2
+
+// Real spherical harmonics of orders 0 … 2 of a unit vector: 1/(2√π), √3/(2√π), √15/(2√π), √5/(4√π), √15/(4√π).
+void sh_basis(vec3 w, out float y[SH_COUNT])
+{
+    y[0] = 0.28209479177;
+    y[1] = 0.48860251190 * w.y;
+    y[2] = 0.48860251190 * w.z;
+    y[3] = 0.48860251190 * w.x;
+    y[4] = 1.09254843059 * w.x * w.y;
+    y[5] = 1.09254843059 * w.y * w.z;
+    y[6] = 0.31539156525 * (3.0 * w.z * w.z - 1.0);
+    y[7] = 1.09254843059 * w.x * w.z;
+    y[8] = 0.54627421529 * (w.x * w.x - w.y * w.y);
+}
+
+// The clamped cosine lobe over π, max(cosθ, 0)/π about n, has coefficients share(l) · Y_lm(n): 1, 2/3, 1/4 (R. Ramamoorthi
+// and P. Hanrahan, SIGGRAPH 2001). In the form of Kaplanyan and Dachsbacher the lobe itself is √π/2 = .8862 · Y00-axis and
+// √(π/3) = 1.0233 for order 1: π · 1 · .2821 = .8862 and π · 2/3 · .4886 = 1.0233.
+float sh_cosine_share(int c) { return c == 0 ? 1.0 : c < 4 ? 2.0 / 3.0 : 0.25; }
+
+// How far a point must go along a unit normal to be in a cell whose centre is not behind the surface, in cells: the cell's
+// half width along the normal. Half a cell for a wall along the grid.
+float half_cell_shift(vec3 n) { return 0.5 * (abs(n.x) + abs(n.y) + abs(n.z)); }
+
+bool inside_grid(ivec3 cell, ivec3 size) { return all(greaterThanEqual(cell, ivec3(0))) && all(lessThan(cell, size)); }
+
+int cell_index(ivec3 cell, ivec3 size) { return (cell.z * size.y + cell.y) * size.x + cell.x; }

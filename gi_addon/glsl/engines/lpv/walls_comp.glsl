@@ -1,0 +1,46 @@
+// The geometry volume's faces from what was drawn (geometry_frag.glsl).
+//
+// What covers a part of a column blocks that part of the light. A surface that closes the whole column within this face and
+// the two next to it along the axis is a wall: it stands between those cells whose centres it separates, and blocks all light
+// there and none elsewhere. By parts, a wall at an angle to the grid, whose points fall into two faces, would let light
+// through twice in part.
+
+#include "engines/lpv/geometry_lib.glsl"
+
+layout(local_size_x = 4, local_size_y = 4, local_size_z = 4) in;
+
+const int WORDS = 5;
+const uint ALL_POINTS = (1u << (LPV_POINTS * LPV_POINTS)) - 1u;
+const uint MIDDLE_POINT = 1u << (LPV_POINTS * LPV_POINTS / 2);
+
+uint points(ivec3 cell, int axis)
+{
+    return inside_grid(cell, grid_size) ? lpv_faces[face_index(cell, axis, grid_size) * WORDS] : 0u;
+}
+
+void main()
+{
+    ivec3 cell = ivec3(gl_GlobalInvocationID);
+    if (!inside_grid(cell, grid_size)) {
+        return;
+    }
+    for (int axis = 0; axis < 3; ++axis) {
+        int face = face_index(cell, axis, grid_size);
+        ivec3 along = ivec3(0);
+        along[axis] = 1;
+        uint here = points(cell, axis);
+        bool closed = (here | points(cell - along, axis) | points(cell + along, axis)) == ALL_POINTS;
+        float blocked = closed ? float((here & MIDDLE_POINT) != 0u)
+                               : float(bitCount(here)) / float(LPV_POINTS * LPV_POINTS);
+        uint count = lpv_faces[face * WORDS + 1];
+        vec3 mean = vec3(lpv_faces[face * WORDS + 2], lpv_faces[face * WORDS + 3], lpv_faces[face * WORDS + 4]) /
+                    (255.0 * float(max(count, 1u)));
+#if HAS_LPV_ALBEDO
+        for (int k = 0; k < 3; ++k) {
+            // From the sums to their mean, as a float in the same word.
+            lpv_albedo[face * 3 + k] = floatBitsToUint(float(lpv_albedo[face * 3 + k]) / (255.0 * float(max(count, 1u))));
+        }
+#endif
+        lpv_walls[face] = vec4(blocked, mean.x, 2.0 * mean.yz - 1.0);
+    }
+}

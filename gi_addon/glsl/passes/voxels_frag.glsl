@@ -1,0 +1,129 @@
+// One column of cells under a triangle: clips the triangle to each cell and adds its area there, and its material by that
+// area, to the cell's sums. The sums are integers: the order does not matter.
+
+#include "surface/surface_point.glsl"
+
+flat in vec3 triangle_a;
+flat in vec3 triangle_b;
+flat in vec3 triangle_c;
+flat in int triangle_axis;
+flat in vec3 triangle_normal_ws;
+
+const int MOST = 9; // corners of a triangle cut by six planes
+
+// Sutherland and Hodgman: keeps the part of a convex polygon where dot(plane.xyz, p) + plane.w ≥ 0.
+void clip_polygon(inout vec3 polygon[MOST], inout int count, vec4 plane)
+{
+    vec3 kept[MOST];
+    int n = 0;
+    for (int i = 0; i < MOST; ++i) {
+        if (i < count) {
+            vec3 from = polygon[i];
+            vec3 to = polygon[i + 1 < count ? i + 1 : 0];
+            float d_from = dot(plane.xyz, from) + plane.w;
+            float d_to = dot(plane.xyz, to) + plane.w;
+            if (d_from >= 0.0) {
+                kept[min(n, MOST - 1)] = from;
+                ++n;
+            }
+            if ((d_from >= 0.0) != (d_to >= 0.0)) {
+                kept[min(n, MOST - 1)] = mix(from, to, d_from / (d_from - d_to));
+                ++n;
+            }
+        }
+    }
+    count = min(n, MOST);
+    polygon = kept;
+}
+
+// Area of the polygon's shadow along z.
+float seen_area(vec3 polygon[MOST], int count)
+{
+    vec3 sum = vec3(0.0);
+    for (int i = 1; i < MOST - 1; ++i) {
+        if (i + 1 < count) {
+            sum += cross(polygon[i] - polygon[0], polygon[i + 1] - polygon[0]);
+        }
+    }
+    return 0.5 * abs(sum.z);
+}
+
+void add(uint at, float value) { atomicAdd(voxel_sums[at], uint(int(round(value)))); }
+
+void main()
+{
+    vec3 front = dot(vary_normal_ws, triangle_normal_ws) < 0.0 ? -triangle_normal_ws : triangle_normal_ws;
+    SurfacePoint point = surface_point(front);
+    Closure c = surface_closure(point);
+    float opacity = surface_opacity(c);
+    vec3 albedo = c.diffuse;
+#if SURFACE_TABLES > 0
+    albedo += lobe_albedo_average(brdf_average, brdf_energy, closure_lobe(c));
+#endif
+    albedo = saturate(albedo); // more than all light reflected would not settle
+
+    // The triangle inside this column.
+    vec2 column = floor(gl_FragCoord.xy);
+    vec3 polygon[MOST];
+    polygon[0] = triangle_a;
+    polygon[1] = triangle_b;
+    polygon[2] = triangle_c;
+    int count = 3;
+    clip_polygon(polygon, count, vec4(1.0, 0.0, 0.0, -column.x));
+    clip_polygon(polygon, count, vec4(-1.0, 0.0, 0.0, column.x + 1.0));
+    clip_polygon(polygon, count, vec4(0.0, 1.0, 0.0, -column.y));
+    clip_polygon(polygon, count, vec4(0.0, -1.0, 0.0, column.y + 1.0));
+    if (count == 0) {
+        discard;
+    }
+    float low = 1e30;
+    float high = -1e30;
+    for (int i = 0; i < MOST; ++i) {
+        if (i < count) {
+            low = min(low, polygon[i].z);
+            high = max(high, polygon[i].z);
+        }
+    }
+    vec3 facing = abs(front);
+    float along = triangle_axis == 0 ? facing.x : triangle_axis == 1 ? facing.y : facing.z;
+    // A triangle leans by no more than one cell a cell along each of the other two axes: three layers, and one more for
+    // a range that ends on a border.
+    for (int k = 0; k < 4; ++k) {
+        float layer = floor(low) + float(k);
+        if (layer > high) {
+            continue;
+        }
+        vec3 part[MOST] = polygon;
+        int corners = count;
+        clip_polygon(part, corners, vec4(0.0, 0.0, 1.0, -layer));
+        clip_polygon(part, corners, vec4(0.0, 0.0, -1.0, layer + 1.0));
+        vec3 turned_cell = vec3(column, layer);
+        ivec3 cell = ivec3(triangle_axis == 0 ? turned_cell.zxy : triangle_axis == 1 ? turned_cell.yzx : turned_cell);
+        if (corners == 0 || any(lessThan(cell, ivec3(0))) || any(greaterThanEqual(cell, grid_size)) ||
+            cell.z < slab.x || cell.z >= slab.x + slab.y) {
+            continue;
+        }
+        float seen = seen_area(part, corners);
+        // A cell that is only touched is still taken: one unit.
+        float weight = max(round(seen / along * float(VOXEL_UNITS)), 1.0);
+        uint at = uint(((cell.z - slab.x) * grid_size.y + cell.y) * grid_size.x + cell.x) * uint(VOXEL_WORDS);
+        add(at, weight);
+        add(at + 1u, weight * opacity);
+        add(at + 2u, weight * albedo.r);
+        add(at + 3u, weight * albedo.g);
+        add(at + 4u, weight * albedo.b);
+        vec3 vector = front * (seen / along * float(VOXEL_UNITS) * opacity);
+        add(at + 5u, abs(vector.x));
+        add(at + 6u, abs(vector.y));
+        add(at + 7u, abs(vector.z));
+        add(at + 8u, vector.x);
+        add(at + 9u, vector.y);
+        add(at + 10u, vector.z);
+#if VOXEL_EMISSION
+        float scale = weight / (float(VOXEL_UNITS) * emission_unit);
+        add(at + 11u, c.emission.r * scale);
+        add(at + 12u, c.emission.g * scale);
+        add(at + 13u, c.emission.b * scale);
+#endif
+    }
+}

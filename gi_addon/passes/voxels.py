@@ -1,0 +1,178 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The scene in voxels: per cell its surface area as each axis sees it, albedo, normal and emission, averaged by area.
+
+Every triangle is drawn along the axis that it faces most, grown by half a cell, and clipped exactly against each cell it
+meets: none is missed, and each adds the area that lies inside. Sums are integers, so that the order of drawing does not
+show. The layers of the grid are made a few at a time, so that the sums need little memory at any resolution.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+
+from ..facts import Facts
+from ..frame import Frame
+from ..gl.context import MIB
+from ..graph import Buffer, Optional, Pass, Planned, Texture, Uniform
+from ..scene import DIFFUSE
+
+# Sums are fixed point: this many units are one cell face of area. 32 bits then hold 4096 layers of surface in one cell.
+UNITS = 1 << 20
+# Words per cell: weight, area × opacity, albedo, projected area, normal; emission.
+_WORDS, _EMISSION_WORDS = 11, 3
+# For the sums of the layers that are made at once; OpenGL 4.3 promises storage blocks of no more than 128 MiB.
+_SLAB_BYTES = 64 * MIB
+
+GRID_UNIFORMS = (
+    Uniform("grid_low", "vec3", "corner of the voxel grid, world space, m"),
+    Uniform("grid_cell", "float", "width of a cell, m"),
+    Uniform("grid_size", "ivec3", "cells along x, y, z"),
+)
+
+
+@dataclass(frozen=True)
+class VoxelGrid:
+    """A grid of cubic cells: corner ``low`` (3,) in m, ``cell`` width in m, ``size`` in cells, and ``levels`` of mips
+    above the cells that halve exactly."""
+
+    low: tuple[float, float, float]
+    cell: float
+    size: tuple[int, int, int]
+    levels: int
+
+    @staticmethod
+    def around(bounds: np.ndarray, resolution: int) -> VoxelGrid:
+        """The grid of ``resolution`` cells along the longest side of ``bounds`` (2, 3). The outermost surfaces of that
+        side lie in the middle of cells: a wall on the border between two cells would be in either by rounding."""
+        low, high = np.asarray(bounds, "f8")
+        extent = high - low
+        longest = float(extent.max())
+        cell = longest / (resolution - 1) if longest > 0.0 else 1.0
+        # The coarsest mip has 8 cells along the longest side; all sides are whole multiples of its cells.
+        levels = max(1, resolution.bit_length() - 4)
+        step = 1 << levels
+        needed = np.ceil(extent / cell - 1e-6) + 1.0
+        size = (np.ceil(needed / step) * step).astype(int)
+        corner = (low + high) / 2.0 - size * cell / 2.0
+        return VoxelGrid(tuple(corner.tolist()), cell, tuple(size.tolist()), levels)
+
+    def uniforms(self) -> dict:
+        """Values of GRID_UNIFORMS."""
+        return {"grid_low": self.low, "grid_cell": self.cell, "grid_size": self.size}
+
+
+def voxel_grid(facts: Facts) -> VoxelGrid:
+    """The frame's grid."""
+    return VoxelGrid.around(facts.rig.bounds, facts.settings.vct.resolution)
+
+
+def _size(facts: Facts) -> tuple[int, int, int]:
+    return voxel_grid(facts).size
+
+
+def _words(facts: Facts) -> int:
+    return _WORDS + (_EMISSION_WORDS if facts.glowing_voxels else 0)
+
+
+def _slab(facts: Facts) -> int:
+    """Layers of the grid that are made at once."""
+    x, y, z = _size(facts)
+    return int(np.clip(_SLAB_BYTES // (x * y * 4 * _words(facts)), 1, z))
+
+
+class Voxelisation(Pass):
+    """Triangles to cells. Static: run when meshes, transforms or materials change."""
+
+    title = "Voxelization"
+    figure = "Voxelization"
+    reads = (Optional("brdf.albedo"), Optional("brdf.average"), Optional("brdf.energy"))
+    writes = (
+        Texture("voxels.area", "voxel_area", "area of opaque surface in the cell as seen along x, y, z, in cell faces; "
+                "mean opacity of the surfaces, 0 in empty cells", "rgba16f", _size),
+        Texture("voxels.albedo", "voxel_albedo", "mean share of light that the surfaces reflect; 1 where there are any",
+                "rgba8", _size),
+        Texture("voxels.normal", "voxel_normal", "Σ area × opacity × normal of their fronts, world space, in cell faces: "
+                "shorter than the area where they face apart", "rgba16f", _size),
+        Texture("voxels.emission", "voxel_emission", "mean emitted radiance, W/(m²·sr)", "rgba16f", _size,
+                when=lambda f: None if f.glowing_voxels else "no voxel shines: nothing emits, or lights sampled on it do"),
+        Buffer("voxels.sums", "voxel_sums", "fixed-point sums of the layers in the making", "uint", np.dtype("u4"),
+               lambda f: _slab(f) * _size(f)[0] * _size(f)[1] * _words(f), scratch=True),
+        Texture("voxels.raster", "voxel_raster", "stands for the grid's layers while triangles are drawn; holds nothing",
+                "r8", lambda f: (max(_size(f)),) * 2, scratch=True),
+    )  # fmt: skip
+    uniforms = (
+        *GRID_UNIFORMS,
+        Uniform("slab", "ivec2", "first layer in the making, and how many"),
+        Uniform("emission_unit", "float", "radiance of one unit of the emission's sums per unit of weight, W/(m²·sr)"),
+    )
+    shaders = {"resolve": {"compute": "passes/voxels_comp.glsl"}}
+    depends = ("transforms", "meshes", "materials")
+    settings = ("vct.resolution", "vct.emissive_voxels", "use_area_lights")
+
+    def rate(self, facts: Facts) -> str:
+        return "subframe" if facts.settings.vct.continuous_voxelization else "static"
+
+    def absent(self, facts: Facts) -> str | None:
+        return None if facts.triangles else "the scene has no surfaces"
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return {"VOXEL_UNITS": UNITS, "VOXEL_WORDS": _words(facts), "VOXEL_EMISSION": int(facts.glowing_voxels)}
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        facts = planned.facts
+        grid = voxel_grid(facts)
+        target = frame.pool.framebuffer([frame.resources["voxels.raster"]])
+        sums = frame.resources["voxels.sums"]
+        resolve = frame.program(planned, "resolve")
+        stages = {
+            "vertex": "passes/voxels_vert.glsl", "geometry": "passes/voxels_geom.glsl",
+            "fragment": "passes/voxels_frag.glsl",
+        }  # fmt: skip
+        options = {
+            "full": True, "units": len(planned.texture_reads()), "defines": {
+                "SURFACE_TABLES": 2 if planned.has("brdf.average") else 0, "SURFACE_SEE_THROUGH_GLASS": 1,
+                "SURFACE_SEEN_BY_CAMERA": 0, "SURFACE_SEEN_BY_SHADOW": 0,
+            },
+        }  # fmt: skip
+        # An emitter of mean radiance fills 2¹⁶ units, so that textures may outshine their mean 4096 times over.
+        brightest = float(facts.emitters.radiance.max()) if len(facts.emitters) else 1.0
+        values = {**grid.uniforms(), "emission_unit": max(brightest, 1e-30) / 65536.0}
+        layers = _slab(facts)
+        for first in range(0, grid.size[2], layers):
+            count = min(layers, grid.size[2] - first)
+            sums.clear()
+            frame.gl.ctx.memory_barrier()
+            target.use()
+            target.scissor = None
+            target.viewport = (0, 0, *target.size)
+            frame.gl.ctx.enable_only(moderngl.NOTHING)
+            frame.bind(planned)
+            for program in frame.gpu.programs(planned, stages, DIFFUSE, **options):
+                frame.set(program, slab=(first, count), **values)
+            frame.gpu.draw(planned, stages, DIFFUSE, _slab_view(grid, first, count), **options)
+            frame.gl.ctx.memory_barrier()
+            frame.set(resolve, slab=(first, count), **values)
+            self._resolve(frame, planned, resolve, (*grid.size[:2], count))
+
+    @staticmethod
+    def _resolve(frame: Frame, planned: Planned, program, size: tuple[int, int, int]) -> None:
+        """Sums to means, as Frame.compute, without the raster target among the images."""
+        frame.bind(planned)
+        for slot, texture in enumerate(planned.texture_writes()):
+            if len(texture.size(planned.facts)) == 3:
+                frame.resources[texture.name].bind_to_image(slot, read=False, write=True)
+        program.run(*(-(-n // 4) for n in size))
+        frame.gl.ctx.memory_barrier()
+
+
+def _slab_view(grid: VoxelGrid, first: int, count: int) -> np.ndarray:
+    """clip_from_world (4, 4), column-major, of the box around ``count`` layers: what is drawn for them."""
+    low, size = np.array(grid.low), np.array(grid.size, "f8")
+    low = low + np.array([0.0, 0.0, first * grid.cell])
+    half = np.array([size[0], size[1], count]) * grid.cell / 2.0
+    clip = np.diag([*(1.0 / half), 1.0])
+    clip[:3, 3] = -(low + half) / half
+    return np.ascontiguousarray(clip.T, "f4")

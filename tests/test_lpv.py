@@ -1,0 +1,429 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""LPV against closed forms: injection, propagation, look-up, bounces. f_s = 1: nothing here is fitted."""
+
+from __future__ import annotations
+
+from itertools import permutations, product
+
+import numpy as np
+import pytest
+from conftest import make
+
+from gi_addon.compare import scenes
+from gi_addon.engines import lpv
+from gi_addon.engines.lpv import Grid, fixed_point_groups, grid, ordinates
+from gi_addon.gl import shared
+from gi_addon.gpu_types import LIGHT, LIGHT_POINT, LIGHT_SUN
+from gi_addon.renderer import Renderer, inspect
+from gi_addon.settings import Settings
+
+SMALL = (48, 27)
+
+
+def indirect(scene, **settings):
+    options = {"technique": "LPV", "samples": 1, "resolution": SMALL, "lpv__resolution": 16} | settings
+    return make(scene, "Diffuse Indirect", **options).passes["Diffuse Indirect"]
+
+
+def volumes(scene, inject=None, **settings):
+    """(grid, lpv.source, lpv.volume, lpv.walls) after one sub-frame; volumes (9, z, y, x, 3), walls (z, y, x, 3, 4).
+    ``inject`` (9, z, y, x, 3) takes the place of the sources."""
+    chosen = Settings()
+    for name, value in ({"technique": "LPV", "lpv__resolution": 16} | settings).items():
+        chosen.set(name.replace("__", "."), value)
+
+    def job(g):
+        renderer = Renderer(g)
+        renderer.render(scene, chosen, ("Diffuse Indirect",), resolution=(16, 9), subframes=1)
+        frame = renderer.frame
+        cells = grid(frame.facts)
+        nx, ny, nz = cells.size
+        if inject is not None:
+            data = np.zeros((9, nz, ny, nx, 4), "f4")
+            data[..., :3] = inject(cells)
+            frame.resources["lpv.source"].write(data.tobytes())
+            planned = next(p for p in renderer._plan.run if p.title == "LPV Propagation")
+            planned.task.run(frame, planned)
+
+        def texture(name):
+            return np.frombuffer(frame.resources[name].read(), "f4").reshape(9, nz, ny, nx, 4)[..., :3].astype("f8")
+
+        walls = frame.resources.get("lpv.walls")
+        out = (
+            cells, texture("lpv.source"), texture("lpv.volume"),
+            None if walls is None else np.frombuffer(walls.read(), "f4").reshape(nz, ny, nx, 3, 4),
+        )  # fmt: skip
+        renderer.close()
+        return out
+
+    return shared().call(job)
+
+
+def harmonics(w):
+    """Real spherical harmonics (…, 9) of unit vectors (…, 3), in the shaders' order."""
+    x, y, z = np.moveaxis(np.asarray(w, "f8"), -1, 0)
+    return np.stack([
+        0.28209479177 + 0 * x, 0.48860251190 * y, 0.48860251190 * z, 0.48860251190 * x, 1.09254843059 * x * y,
+        1.09254843059 * y * z, 0.31539156525 * (3 * z * z - 1), 1.09254843059 * x * z, 0.54627421529 * (x * x - y * y),
+    ], -1)  # fmt: skip
+
+
+def flux_of(source, cell):
+    """All flux of a source volume, W: ∫ Σ c Y dω = c₀ √(4π), and Q is over h²."""
+    return source[0].sum(axis=(0, 1, 2)) * np.sqrt(4.0 * np.pi) * cell**2
+
+
+# --- the pieces -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("count", [48, 72])
+def test_ordinates_integrate_the_sphere_and_are_symmetric(count):
+    """Exact to degree 7: moments of x⁴, x²y², x⁶ and x²y²z² are 1/5, 1/15, 1/7 and 1/105 of the sphere."""
+    table = ordinates(count).astype("f8")
+    w, share = table[:, :3], table[:, 3] / (4.0 * np.pi)
+    x, y, z = w.T
+    assert len(table) == count and share.sum() == pytest.approx(1.0, abs=1e-6)
+    for value, expected in ((x**4, 1 / 5), (x * x * y * y, 1 / 15), (x**6, 1 / 7), (x * x * y * y * z * z, 1 / 105)):
+        assert (share * value).sum() == pytest.approx(expected, abs=1e-6)
+    assert np.abs(w).min() > np.sin(np.radians(7.0))
+    known = {tuple(np.round(v, 5)) for v in w}
+    for order in permutations(range(3)):
+        for signs in product((-1, 1), repeat=3):
+            assert {tuple(np.round(v[list(order)] * signs, 5)) for v in w} == known
+
+
+def test_the_grid_covers_the_scene_with_a_cell_to_spare():
+    bounds = np.array([[-3.0, 0.0, 1.0], [5.0, 2.0, 1.5]])
+    g = Grid.over(bounds, 18)
+    assert g.cell == pytest.approx(0.5) and g.size == (18, 6, 3)
+    low = np.array(g.origin)
+    high = low + g.cell * np.array(g.size)
+    assert (bounds[0] - low >= g.cell - 1e-9).all() and (high - bounds[1] >= g.cell - 1e-9).all()
+    flat = Grid.over(np.array([[1.0, 1.0, 1.0], [1.0, 1.0, 1.0]]), 16)
+    assert np.isfinite(flat.origin).all() and flat.cell > 0
+
+
+def test_weak_lights_are_summed_in_units_of_their_own():
+    lights = np.zeros(3, LIGHT)
+    lights["kind"] = LIGHT_POINT, LIGHT_SUN, LIGHT_POINT
+    lights["emission"] = [[100.0] * 3, [1e-3] * 3, [90.0] * 3]
+    groups = fixed_point_groups(lights, 0.1)
+    assert [g for _, g in groups] == [{0, 2}, {1}]
+    assert groups[0][0] * 4.0 * np.pi * 190.0 < 2**30 and groups[1][0] > groups[0][0]
+
+
+def test_injected_flux_is_what_the_surfaces_reflect(gl):
+    """ρΦ, to 1e-3, whatever the resolution of map or grid; its first moment is 2/3 of the flux, inwards."""
+    scene = scenes.integrating_sphere(albedo=0.5, power=100.0, light=(0.3, 0.0, 0.2))
+    for settings in ({}, {"lpv__resolution": 24}, {"rsm__resolution": 128}):
+        g, source, _, _ = volumes(scene, **settings)
+        np.testing.assert_allclose(flux_of(source, g.cell), 50.0, rtol=1e-3)
+    z, y, x = np.indices(source.shape[1:4])
+    radial = np.stack([x, y, z], -1) + 0.5 - np.array(g.size) / 2.0
+    radial /= np.linalg.norm(radial, axis=-1, keepdims=True)
+    # ∫ w Q dω = √(4π/3) (c₃, c₁, c₂).
+    first = np.sqrt(4.0 * np.pi / 3.0) * np.stack([source[k, ..., 0] for k in (3, 1, 2)], -1)
+    inwards = -(first * radial).sum() * g.cell**2
+    assert inwards == pytest.approx(50.0 * 2 / 3, rel=0.02)
+
+
+def far_scene():
+    """Two specks at the corners of a box: bounds to lay a grid over, and nothing in the way."""
+    b = scenes.SceneBuilder("specks")
+    for corner in (-1.0, 1.0):
+        b.quads(scenes.box_quads((corner - 1e-4,) * 3, (corner + 1e-4,) * 3), scenes.diffuse((0.5,) * 3))
+    b.light(scenes.point_light((0.5, 0.2, 0.1), 1.0))
+    return b.build(scenes.perspective((0, -4, 0), (0, 0, 0), 0.8))
+
+
+def emitter(direction=None):
+    """A source of 1 W in the middle cell: in all directions alike, or a cosine lobe."""
+    def inject(g):
+        out = np.zeros((9, g.size[2], g.size[1], g.size[0], 3))
+        c = [s // 2 for s in g.size]
+        values = np.zeros(9)
+        if direction is None:
+            values[0] = 1.0 / np.sqrt(4.0 * np.pi)
+        else:
+            values = harmonics(np.array(direction) / np.linalg.norm(direction)) * np.array([1] + [2 / 3] * 3 + [1 / 4] * 5)
+        out[:, c[2], c[1], c[0]] = (values / g.cell**2)[:, None]
+        return out
+
+    return inject
+
+
+@pytest.mark.parametrize("direction", [None, (0, 0, 1), (0.3, -0.5, 0.8)])
+def test_free_propagation_conserves_flux(gl, direction):
+    """What leaves the grid is what was sent in: 1 W. Light of ω_a < 0 is never above the source's layer of axis a, so on the
+    grid's upper side of a all light goes out, and ∫ L ω_a dω, a harmonic of order 1, is what crosses it per h²; and so below."""
+    g, source, volume, _ = volumes(far_scene(), inject=emitter(direction), lpv__occlusion=False)
+    assert flux_of(source, g.cell)[0] == pytest.approx(1.0, rel=1e-4)
+    leaving = 0.0
+    for axis, k in ((0, 3), (1, 1), (2, 2)):
+        layers = np.moveaxis(np.sqrt(4.0 * np.pi / 3.0) * volume[k, ..., 0] * g.cell**2, 2 - axis, 0)
+        leaving += layers[-1].sum() - layers[0].sum()
+    assert leaving == pytest.approx(1.0, rel=1e-3)
+
+
+def test_a_lobe_propagates_alike_in_all_48_orientations(gl):
+    """Stability test 4b: ≤ 1e-3. Flips and permutations of the axes, of a lobe that none of them leaves unchanged."""
+    # A cubic grid: the lobe's own cell is its middle only for odd sizes.
+    base = np.array([0.2, 0.5, 0.84])
+    reference = None
+    for order, signs in (((0, 1, 2), (1, 1, 1)), ((1, 0, 2), (1, 1, 1)), ((2, 1, 0), (-1, 1, 1)), ((1, 2, 0), (1, -1, -1))):
+        direction = base[list(order)] * signs
+        _, _, volume, _ = volumes(far_scene(), inject=emitter(direction), lpv__occlusion=False, lpv__resolution=17)
+        scalar = volume[0, ..., 0].transpose(2, 1, 0)  # x, y, z
+        for axis in range(3):
+            if signs[axis] < 0:
+                scalar = np.flip(scalar, axis)
+        scalar = scalar.transpose(np.argsort(order))
+        reference = scalar if reference is None else reference
+        assert np.abs(scalar - reference).max() <= 1e-3 * reference.max()
+
+
+def test_a_point_emitter_shines_alike_in_all_directions(gl):
+    """Fluence at distance r is Φ/(4πr²), in the mean over directions to 10 %, along the axes and along diagonals to 35 %:
+    the ordinates' own rays are what is left of the grid."""
+    g, _, volume, _ = volumes(far_scene(), inject=emitter(), lpv__occlusion=False, lpv__resolution=17)
+    c = [s // 2 for s in g.size]
+    z, y, x = np.indices(volume.shape[1:4])
+    offset = (np.stack([x, y, z], -1) - np.array(c)) * g.cell
+    r = np.linalg.norm(offset, axis=-1)
+    shell = (r > 3.2 * g.cell) & (r < 5.0 * g.cell)
+    fluence = volume[0, ..., 0] * np.sqrt(4.0 * np.pi)
+    ratio = fluence[shell] * 4.0 * np.pi * r[shell] ** 2
+    assert ratio.mean() == pytest.approx(1.0, abs=0.1)
+    assert ratio.std() < 0.35
+
+
+def test_cosine_lobes_of_the_paper_do_not_cross_a_room():
+    """Why propagate_comp.glsl leaves the paper's lobes: Kaplanyan and Dachsbacher's propagation with exact constants (.4007,
+    .4234; .8862, 1.0233; rotated sides) in a room of n³ cells whose floor emits B. The ceiling gets .2 B by form factors;
+    with lobes it gets .01 B of 8 cells and less than .001 B of 16."""
+    axes = [np.array(v, "f8") for v in ((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1))]
+
+    def ceiling(n):
+        lobe = lambda v: np.array([0.88622693, *(1.02332671 * v)]) / np.pi  # noqa: E731
+        cells = np.zeros((n, n, n, 4))
+        cells[:, :, 0] = lobe(axes[4])
+        total = cells.copy()
+        for _ in range(3 * n):
+            fresh = np.zeros_like(cells)
+            for d in axes:
+                axis, step = int(np.abs(d).argmax()), int(d.sum())
+                moved = np.roll(cells, step, axis)
+                moved[(slice(None),) * axis + (0 if step > 0 else -1,)] = 0.0
+                for f in axes:
+                    if (f == -d).all():
+                        continue
+                    front = (f == d).all()
+                    w = d if front else d * 0.89442719 + f * 0.4472136
+                    flux = moved @ np.array([0.28209479, *(0.48860251 * w)]) * (0.40066968 if front else 0.42343135)
+                    fresh += flux[..., None] * lobe(f)
+            cells = fresh
+            total += cells
+        top = total[:, :, -1]
+        return ((np.pi * 0.28209479 * top[..., 0] + 2 * np.pi / 3 * 0.48860251 * top[..., 3]) / 1.5).mean()
+
+    assert 0.002 < ceiling(8) < 0.02
+
+
+# --- rooms ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("lamp", "resolution"), [((0, 0, 0), 16), ((0.5, 0.0, 0.2), 16), ((0, 0, 0), 32)])
+def test_sphere_one_bounce_matches_closed_form(gl, lamp, resolution):
+    """Stability test 1: E₁ = ρΦ/(4πR²) everywhere, |g − 1| ≤ .05, CV ≤ .15."""
+    image = indirect(scenes.integrating_sphere(albedo=0.5, power=100.0, light=lamp), lpv__resolution=resolution)[..., 0] * np.pi
+    g = image / (0.5 * 100.0 / (4.0 * np.pi))
+    assert abs(g.mean() - 1.0) <= 0.05
+    assert g.std() / g.mean() <= 0.15
+
+
+@pytest.mark.parametrize("bounces", [2, 4])
+def test_sphere_bounces_add_up(gl, bounces):
+    """Stability test 2: after D bounces E = E₀ (ρ + … + ρ^D), relative to one bounce to ± .025 of the limit."""
+    scene = scenes.integrating_sphere(albedo=0.5, power=100.0)
+    one, more = indirect(scene).mean(), indirect(scene, bounces=bounces).mean()
+    assert 0.5 * more / one == pytest.approx(1.0 - 0.5**bounces, abs=0.025)
+
+
+def test_no_bounce_brings_back_more_than_the_albedo(gl):
+    """Stability test 4: Φ_{n+1}/Φ_n ≤ ρ, in a box at an angle to the grid."""
+    b = scenes.SceneBuilder("box")
+    a = np.radians(30.0)
+    turn = np.eye(4)
+    turn[:2, :2] = [[np.cos(a), -np.sin(a)], [np.sin(a), np.cos(a)]]
+    b.add(scenes.mesh_from_quads(scenes.box_quads((-1, -1, 0), (1, 1, 2), inward=True)), scenes.diffuse((0.8,) * 3), turn)
+    b.light(scenes.point_light((0.2, 0.1, 1.2), 50.0))
+    scene = b.build(scenes.perspective((0, -0.8, 1), (0, 1, 1), 1.6, clip=(0.01, 10)))
+    means = [indirect(scene, bounces=n).mean() for n in (1, 2, 3, 4)]
+    steps = np.diff(means)
+    assert (steps[1:] <= 0.82 * steps[:-1]).all() and steps[-1] > 0
+
+
+def test_energy_does_not_depend_on_map_or_grid(gl):
+    """Stability test 13: ≤ 3 % over maps, and over grids from 16 to 32."""
+    scene = scenes.cornell(blocks=False)
+    maps = [indirect(scene, rsm__resolution=r).mean() for r in (128, 512)]
+    assert max(maps) / min(maps) < 1.03
+    grids = [indirect(scene, lpv__resolution=r).mean() for r in (16, 24, 32)]
+    assert max(grids) / min(grids) < 1.03
+
+
+def test_light_stays_on_its_side_of_a_thin_wall(gl):
+    """Stability test 5, wall and room at an angle to the grid: ≤ 1 % however thin the wall; without occlusion it leaks."""
+    b = scenes.SceneBuilder("wall")
+    a = np.radians(20.0)
+    turn = np.eye(4)
+    turn[:2, :2] = [[np.cos(a), -np.sin(a)], [np.sin(a), np.cos(a)]]
+    white = scenes.diffuse((0.7,) * 3)
+    b.add(scenes.mesh_from_quads(scenes.box_quads((-2, -1, 0), (2, 1, 2), inward=True)), white, turn)
+    b.add(scenes.mesh_from_quads(scenes.box_quads((-0.005, -1, 0), (0.005, 1, 2))), white, turn)
+    b.light(scenes.point_light(turn[:3, :3] @ (-1.2, 0.1, 1.3), 50.0))
+    images = []
+    for side in (-1, 1):
+        eye = turn[:3, :3] @ (0.3 * side, 0.0, 1.0)
+        target = turn[:3, :3] @ (2.0 * side, 0.0, 1.0)
+        images.append(b.build(scenes.perspective(eye, target, 1.5, clip=(0.01, 10))))
+        lit_or_dark = indirect(images[-1], lpv__resolution=24).mean()
+        images[-1] = (images[-1], lit_or_dark)
+    assert images[1][1] <= 0.01 * images[0][1]
+    assert indirect(images[1][0], lpv__resolution=24, lpv__occlusion=False).mean() > 0.05 * images[0][1]
+
+
+def test_scale_does_not_matter(gl):
+    """Stability test 12: a scene k times as large under k² the power looks the same."""
+    reference = indirect(scenes.integrating_sphere(radius=1.0, power=100.0, segments=32))
+    for k in (1e-3, 1e3):
+        image = indirect(scenes.integrating_sphere(radius=k, power=100.0 * k * k, segments=32))
+        assert np.mean((image - reference) ** 2 / reference.mean() ** 2) <= 1e-4
+
+
+def test_power_is_linear_and_renders_are_bit_identical(gl):
+    """Stability tests 16 and 17."""
+    once, again = indirect(scenes.cornell()), indirect(scenes.cornell())
+    np.testing.assert_array_equal(once, again)
+    strong = indirect(scenes.cornell(power=600.0))
+    assert np.abs(strong - 10.0 * once).max() <= 1e-3 * strong.mean()
+    both = scenes.cornell()
+    both.lights.append(scenes.point_light((0.3, -0.2, 1.2), 20.0))
+    other = scenes.cornell()
+    other.lights = both.lights[1:]
+    difference = np.abs(indirect(both) - once - indirect(other))
+    assert difference.mean() <= 1e-3 * indirect(both).mean() and difference.max() <= 1e-3 * indirect(both).max()
+
+
+def test_the_camera_does_not_move_the_light(gl):
+    """Stability test 8: the grid belongs to the scene. The volume is the same from anywhere."""
+    scene = scenes.cornell()
+    _, _, first, _ = volumes(scene)
+    scene.camera = scenes.perspective((0.113, -3.9, 1.07), (0, 0, 1), 0.9)
+    _, _, second, _ = volumes(scene)
+    np.testing.assert_array_equal(first, second)
+
+
+def test_nothing_is_not_a_number(gl):
+    """Stability test 18: degenerate triangles, a zero scale, an empty scene."""
+    b = scenes.SceneBuilder("odd")
+    b.quads(np.array([[[0, 0, 0], [0, 0, 0], [0, 0, 0], [0, 0, 0]], [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]], "f8"),
+            scenes.principled(Base_Color=(0.8, 0.8, 0.8), Roughness=0.2))  # fmt: skip
+    b.add(scenes.sphere(0.3, 8, 4), scenes.diffuse((0.5,) * 3), np.diag([0.0, 0.0, 0.0, 1.0]))
+    b.light(scenes.point_light((0, 0, 1), 100.0))
+    for camera in (scenes.perspective((0, -3, 1), (0, 0, 0), 0.8), scenes.perspective((0, 3, 1), (0, 9, 1), 0.8)):
+        passes = make(b.build(camera), "Combined", "Diffuse Indirect", "Glossy Indirect", "Ambient Occlusion", samples=2,
+                      technique="LPV", lpv__resolution=16, bounces=2, resolution=SMALL).passes  # fmt: skip
+        assert all(np.isfinite(image).all() for image in passes.values())
+
+
+# --- effects ----------------------------------------------------------------------------------------------------------
+
+
+def test_a_mirror_shows_the_lit_wall(gl):
+    """A smooth metal floor under an evenly lit ceiling reflects the ceiling's radiance: E ρ/π, to 10 %."""
+    b = scenes.SceneBuilder("mirror")
+    b.quads(np.array([[[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]], "f8"),
+            scenes.principled(Base_Color=(1, 1, 1), Metallic=1.0, Roughness=0.05))  # fmt: skip
+    b.quads(np.array([[[-4, 4, 2], [4, 4, 2], [4, -4, 2], [-4, -4, 2]]], "f8"), scenes.diffuse((0.6,) * 3))
+    b.light(scenes.sun_light((0.0, 0.0, 1.0), 3.0))
+    scene = b.build(scenes.perspective((0.0, -1.0, 1.2), (0, 0, 0), 0.3))
+    passes = make(scene, "Glossy Indirect", "Glossy Color", "Depth", technique="LPV", samples=8, resolution=SMALL,
+                  lpv__resolution=24).passes  # fmt: skip
+    seen = passes["Depth"][..., 0] < 1e9
+    # The floor takes part of the sun away from the ceiling: its shadow is seen in the middle. Lit is the rest.
+    light = passes["Glossy Indirect"][seen]
+    assert np.isfinite(light).all() and light.max() > 0.0
+    assert np.percentile(light, 95) == pytest.approx(0.6 * 3.0 / np.pi, rel=0.15)
+
+
+def test_a_pane_shows_the_lit_wall_behind_it(gl):
+    """Through a refracting sheet the wall's radiance E ρ/π arrives, whatever the tint, which the pass is divided by: to 10 %."""
+    b = scenes.SceneBuilder("pane")
+    b.quads(np.array([[[-2, 1, -2], [2, 1, -2], [2, 1, 2], [-2, 1, 2]]], "f8"), scenes.diffuse((0.6,) * 3))
+    b.quads(np.array([[[-2, 0, -2], [2, 0, -2], [2, 0, 2], [-2, 0, 2]]], "f8"),
+            scenes.principled(Base_Color=(0.5, 0.8, 0.9), Transmission_Weight=1.0, Roughness=0.0, IOR=1.45))  # fmt: skip
+    b.light(scenes.sun_light((0.0, 1.0, 0.0), 3.0))
+    scene = b.build(scenes.perspective((0, -2, 0), (0, 1, 0), 0.3))
+    passes = make(scene, "Transmission Indirect", "Transmission Color", technique="LPV", samples=16, resolution=SMALL,
+                  lpv__resolution=24).passes  # fmt: skip
+    seen = passes["Transmission Color"][..., 0] > 0.1
+    assert seen.mean() > 0.5
+    assert passes["Transmission Indirect"][seen].mean() == pytest.approx(0.6 * 3.0 / np.pi, rel=0.1)
+
+
+def test_ambient_occlusion_is_the_open_share(gl):
+    """In a box without a lid the floor's middle sees the opening: cos-weighted share of a square overhead, to .05."""
+    b = scenes.SceneBuilder("pit")
+    b.quads(scenes.box_quads((-1, -1, 0), (1, 1, 1), inward=True)[[0, 1, 2, 3, 4]], scenes.diffuse((0.5,) * 3))
+    b.light(scenes.sun_light((0.1, 0.0, -1.0), 1.0))
+    scene = b.build(scenes.perspective((0, 0, 0.9), (0, 0.001, 0), 0.2))
+    image = make(scene, "Ambient Occlusion", technique="LPV", samples=16, resolution=SMALL, lpv__resolution=32,
+                 ao__samples=16, ao__distance=10.0).passes["Ambient Occlusion"][..., 0]  # fmt: skip
+    q = 1.0 / np.sqrt(2.0)
+    expected = 4.0 / (2.0 * np.pi) * 2.0 * q * np.arctan(q)
+    assert image.mean() == pytest.approx(expected, abs=0.05)
+
+
+def test_air_dims_what_goes_through_it(gl):
+    """Beer's law in the grid: the facing wall, distance d away, gets e^(−σd) of the flux, and a lamp's first leg as much."""
+    scene = scenes.integrating_sphere(albedo=0.5, power=100.0, segments=48)
+    sigma = 0.4
+    scene.world = fog(sigma)
+    clear = indirect(scenes.integrating_sphere(albedo=0.5, power=100.0, segments=48)).mean()
+    # One radius from the lamp to the wall, then chords: the mean of e^(−σs) over cosine-weighted chords s = 2R cosθ.
+    u = 2.0 * sigma
+    chord = 2.0 * (1.0 - (1.0 + u) * np.exp(-u)) / u**2
+    image = indirect(scene)
+    # The picture itself is seen through the air.
+    depth = make(scene, "Depth", technique="LPV", samples=1, resolution=SMALL).passes["Depth"]
+    assert np.isfinite(depth).all()
+    assert image.mean() < clear * np.exp(-sigma) * chord * 1.1
+
+
+def fog(density):
+    from test_volumetric import fog as make_fog
+
+    return make_fog(density, color=(0.0, 0.0, 0.0), kind="VOLUME_ABSORPTION")
+
+
+@pytest.mark.parametrize(
+    ("setting", "gone"),
+    [
+        ("use_indirect_diffuse", "LPV Propagation"), ("use_glossy", "LPV Glossy Computation"), ("use_ao", "LPV AO Generation"),
+        ("use_translucency", "LPV Translucency"), ("lpv.occlusion", "LPV Geometry Injection"),
+    ],
+)  # fmt: skip
+def test_a_switched_off_effect_costs_nothing(setting, gone):
+    scene = scenes.cornell()
+    scene.materials[0] = scenes.principled(Base_Color=scenes.WHITE, Roughness=0.3)
+    scene.materials.append(scenes.principled(Transmission_Weight=1.0, Roughness=0.1))
+    scene.instances.materials[-1] = (len(scene.materials) - 1,)
+    chosen = Settings()
+    chosen.set("technique", "LPV")
+    outputs = ("Combined", "Ambient Occlusion")
+    on = {p.title for p in inspect(scene, chosen, outputs, resolution=SMALL).run}
+    chosen.set(setting, False)
+    off = inspect(scene, chosen, outputs, resolution=SMALL)
+    assert gone in on and gone not in {p.title for p in off.run}
+    assert not any(w.name in off.resources for p in lpv.passes(chosen, ()) if p.title == gone for w in p.writes)
