@@ -163,6 +163,10 @@ class LPVSettings:
         32, "Resolution", "Cells along the longest side of the scene", low=8, high=128, unit="cells",
         higher="finer indirect light, less leaking through walls", lower="faster",
     )  # fmt: skip
+    iterations: int = _setting(
+        0, "Iterations", "How many cells far light is carried; 0 is as far as it comes, at the cost of one iteration", low=0,
+        high=512, higher="reaches farther", lower="dark far from lit surfaces; slower than 0 all the same",
+    )  # fmt: skip
     directions: str = _setting(
         "72", "Directions", "Directions that light travels in through the grid",
         choices=(("48", "48", "Faster; small bright patches may show as rays"), ("72", "72", "Smoother")),

@@ -455,3 +455,17 @@ def test_a_switched_off_effect_costs_nothing(setting, gone):
     off = inspect(scene, chosen, outputs, resolution=SMALL)
     assert gone in on and gone not in {p.title for p in off.run}
     assert not any(w.name in off.resources for p in lpv.passes(chosen, ()) if p.title == gone for w in p.writes)
+
+
+def test_iterations_say_how_many_cells_far_light_comes(gl):
+    """After N iterations it is within N cells (|i| + |j| + |k|) of its source, and as many as the grid is wide are all."""
+    for n in (0, 1, 3):
+        g, _, volume, _ = volumes(far_scene(), inject=emitter(), lpv__resolution=8, lpv__occlusion=False, lpv__iterations=n)
+        c = np.array([s // 2 for s in g.size][::-1])
+        lit = np.argwhere(volume[0, ..., 0] > 0.0)
+        reach = np.abs(lit - c).sum(axis=1).max()
+        assert reach == (n or np.maximum(c, np.array(volume.shape[1:4]) - 1 - c).sum())
+    scene = scenes.cornell()
+    _, _, swept, _ = volumes(scene, lpv__resolution=8)
+    g, _, iterated, _ = volumes(scene, lpv__resolution=8, lpv__iterations=sum(g.size))
+    np.testing.assert_allclose(iterated, swept, rtol=1e-4, atol=1e-6 * np.abs(swept).max())

@@ -58,7 +58,7 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         TranslucentBack(),
         TranslucentTint(),
         GeometryInjection(),
-        Propagation(injection, settings.bounces),
+        Propagation(injection, settings.bounces, settings.lpv.iterations),
         AmbientOcclusion(),
         AOBlur(),
         IndirectLighting(),
@@ -338,7 +338,7 @@ class Propagation(Pass):
         Uniform("medium_extinction", "vec3", "share of light lost per metre of the air"),
         Uniform("medium_scattering", "vec3", "share of light scattered per metre"),
         Uniform("medium_anisotropy", "float", "mean cosine of the scattering angle"),
-        Uniform("wave", "int", "the diagonal plane whose cells take their light"),
+        Uniform("wave", "int", "the diagonal plane whose cells take their light, or the iteration"),
     )
     shaders = {
         "expand": {"compute": "engines/lpv/expand_comp.glsl"},
@@ -348,9 +348,9 @@ class Propagation(Pass):
         "bounced": {"compute": "engines/lpv/bounced_comp.glsl"},
     }
     depends = ("lights", "world", "transforms", "meshes", "materials")
-    settings = ("lpv.resolution", "lpv.directions", "lpv.occlusion", "bounces", *_AIR_SETTINGS)
+    settings = ("lpv.resolution", "lpv.directions", "lpv.iterations", "lpv.occlusion", "bounces", *_AIR_SETTINGS)
 
-    def __init__(self, injection: RadianceInjection, bounces: int = 1) -> None:
+    def __init__(self, injection: RadianceInjection, bounces: int = 1, iterations: int = 0) -> None:
         self.injection = injection
         self.reads = ("lpv.source", Optional("lpv.walls"))
         if bounces > 1:
@@ -361,12 +361,23 @@ class Propagation(Pass):
                 Buffer("lpv.reflected", "lpv_reflected", "what the walls reflect in fixed point: cell, harmonic, colour", "int",
                        np.dtype("i4"), lambda f: grid(f).cells * SH_COUNT * 3, scratch=True),
             )  # fmt: skip
+        if iterations:
+            size = self.writes[1].size
+            self.writes += (
+                Texture("lpv.emitted", "lpv_emitted", "what the cells emit along each ordinate, W/(m²·sr)", "rgba32f", size,
+                        access="readwrite", scratch=True),
+                Texture("lpv.carried", "lpv_carried", "lpv.radiance after one iteration more", "rgba32f", size,
+                        access="readwrite", scratch=True),
+            )  # fmt: skip
 
     def rate(self, facts: Facts) -> str:
         return RSMGeneration().rate(facts)
 
     def defines(self, facts: Facts) -> dict[str, int]:
-        return {"HAS_LPV_BOUNCED": int(facts.settings.bounces > 1), **medium_defines(facts)}
+        return {
+            "HAS_LPV_BOUNCED": int(facts.settings.bounces > 1), "LPV_LIMITED": int(facts.settings.lpv.iterations > 0),
+            **medium_defines(facts),
+        }  # fmt: skip
 
     def run(self, frame: Frame, planned: Planned) -> None:
         facts = planned.facts
@@ -410,12 +421,30 @@ class Propagation(Pass):
                       source_scale=1.0 / max(self.injection.count, 1))
             frame.compute(planned, expand, (*g.size[:2], g.size[2] * count), (4, 4, 4))
             _set_grid(frame, carry, facts, batch_first=first, batch_count=count)
-            for wave in range(sum(g.size) - 2):
-                carry["wave"].value = wave
-                carry.run(-(-g.size[0] // 8), -(-g.size[1] // 8), count)
-                frame.gl.ctx.memory_barrier(moderngl.SHADER_IMAGE_ACCESS_BARRIER_BIT)
+            if facts.settings.lpv.iterations:
+                self._iterate(frame, planned, carry, count)
+            else:
+                for wave in range(sum(g.size) - 2):
+                    carry["wave"].value = wave
+                    carry.run(-(-g.size[0] // 8), -(-g.size[1] // 8), count)
+                    frame.gl.ctx.memory_barrier(moderngl.SHADER_IMAGE_ACCESS_BARRIER_BIT)
             _set_grid(frame, gather, facts, batch_first=first, batch_count=count)
             frame.compute(planned, gather, g.size, (4, 4, 4))
+
+    @staticmethod
+    def _iterate(frame: Frame, planned: Planned, carry, count: int) -> None:
+        """The paper's iteration: all cells at once, one cell farther each time. The last one writes ``lpv.radiance``."""
+        g = grid(planned.facts)
+        textures = planned.texture_writes()
+        slots = {t.name: slot for slot, t in enumerate(textures)}
+        last = planned.facts.settings.lpv.iterations
+        for iteration in range(last + 1):
+            pair = ("lpv.carried", "lpv.radiance") if (last - iteration) % 2 == 0 else ("lpv.radiance", "lpv.carried")
+            for name, slot in zip(pair, (slots["lpv.radiance"], slots["lpv.carried"]), strict=True):
+                frame.resources[name].bind_to_image(slot, read=True, write=True)
+            carry["wave"].value = iteration
+            carry.run(-(-g.size[0] // 8), -(-g.size[1] // 8), g.size[2] * count)
+            frame.gl.ctx.memory_barrier(moderngl.SHADER_IMAGE_ACCESS_BARRIER_BIT)
 
 
 class IndirectLighting(Pass):

@@ -24,5 +24,9 @@ void main()
 #endif
         sum += value * y[c];
     }
+#if LPV_LIMITED
+    imageStore(lpv_emitted, at, vec4(sum, 0.0));
+#else
     imageStore(lpv_radiance, at, vec4(sum, 0.0));
+#endif
 }
