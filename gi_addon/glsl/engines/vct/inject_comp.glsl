@@ -96,10 +96,19 @@ void main()
                     open_ += dot(hit - center, ray) > 0.0 ? 1.0 : 0.0;
                     continue;
                 }
+                // What an emissive surface lights within a cell's diagonal of itself is hidden by it: the slit above a ceiling
+                // lamp shares its cell with the room.
+                if (rsm_lights[v.light].kind == LIGHT_MESH && distance(hit, from) < 1.733 * grid_cell) {
+                    open_ += 1.0;
+                    continue;
+                }
                 bool here = out_by <= ROUNDING;
                 inside += here ? 1.0 : 0.0;
                 beside += here ? 0.0 : 1.0;
-                float w = here ? 1.0 : NEAR_BY_WEIGHT;
+                // The ray stands for a solid angle ∝ 1/|p|² (points fill the cell evenly), so for an area |hit|²/|p|² / cosθ:
+                // next to a lamp the mean over rays is not that over the surface.
+                float area = v.perspective > 0.5 ? dot(hit - from, hit - from) / max(dot(ray, ray), 1e-30) : 1.0;
+                float w = (here ? 1.0 : NEAR_BY_WEIGHT) * area / max(abs(facing) / length(ray), GRAZING_COS);
                 vec3 radiance = t.flux / (t.area * PI);
                 // A sheet's back is lit where all its fronts face away (−1); where surfaces face apart (0) it is some
                 // front that is lit.
