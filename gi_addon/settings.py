@@ -164,7 +164,7 @@ class LPVSettings:
         higher="finer indirect light, less leaking through walls", lower="faster",
     )  # fmt: skip
     directions: str = _setting(
-        "48", "Directions", "Directions that light travels in through the grid",
+        "72", "Directions", "Directions that light travels in through the grid",
         choices=(("48", "48", "Faster; small bright patches may show as rays"), ("72", "72", "Smoother")),
     )  # fmt: skip
     glossy_rays: int = _setting(
@@ -200,7 +200,7 @@ class SSDOSettings:
         low=0.01, high=10.0, higher="fewer leaks behind things", lower="light passes behind thin things",
     )  # fmt: skip
     occlusion: str = _setting(
-        "BITMASK", "Ambient Occlusion", "How the Ambient Occlusion pass is made",
+        "MITTRING", "Ambient Occlusion", "How the Ambient Occlusion pass is made",
         choices=(("BITMASK", "Visibility Bitmask", "Sectors of slices that samples fill"),
                  ("MITTRING", "Mittring", "Points along directions, as the other techniques and the paper do")),
     )  # fmt: skip
@@ -245,8 +245,8 @@ class VCTSettings:
         higher="finer directions, sharper contact", lower="faster, blurrier",
     )  # fmt: skip
     shadow_cones: bool = _setting(
-        False, "Shadow Cones", "Direct light's shadows by cones through the voxels in place of shadow maps: soft at one sub-frame, "
-        "as fine as the grid",
+        False, "Shadow Cones", "Direct light's shadows by cones through the voxels in place of shadow maps: soft at one "
+        "sub-frame, as fine as the grid",
     )  # fmt: skip
     emissive_voxels: bool = _setting(
         False, "Emissive Voxels", "Emissive surfaces shine out of the voxels, into the indirect passes: any number of them "

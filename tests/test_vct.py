@@ -12,7 +12,7 @@ from gi_addon.gl import GL, shared
 from gi_addon.outputs import OUTPUTS
 from gi_addon.passes.voxels import VoxelGrid, voxel_grid
 from gi_addon.renderer import Renderer, inspect
-from gi_addon.settings import Settings
+from gi_addon.settings import Settings, walk
 
 
 def vct(scene, *outputs, **settings):
@@ -308,3 +308,117 @@ def test_what_is_switched_off_costs_nothing(gl):
         plan = planned(**off)
         assert not [p.title for p in plan.run if p.title.startswith("Voxel")]
         assert not [name for name in plan.resources if name.startswith(("vct.", "voxels."))]
+
+
+# --- the other effects ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("bounces", [2, 4])
+def test_further_bounces_sum_the_geometric_series(gl, bounces):
+    """Stability test 2: L_D = Σ ρ^k = 1 − .5^D of the light for ρ = .5, ± .025."""
+    scene = scenes.integrating_sphere(albedo=0.5, power=100.0, light=(0.3, 0.0, 0.2), segments=48)
+    image = vct(scene, "Diffuse Indirect", samples=4, bounces=bounces, vct__resolution=24).passes["Diffuse Indirect"][..., 0]
+    assert image.mean() * np.pi / (100.0 / (4 * np.pi)) == pytest.approx(1 - 0.5**bounces, abs=0.025)
+
+
+def _enclosed(material):
+    b = scenes.SceneBuilder()
+    b.add(scenes.sphere(1.0, 48, 24, inward=True), scenes.emissive((1, 1, 1), 1.0))
+    b.add(scenes.sphere(0.3, 32, 16), material)
+    return b.build(scenes.perspective((0, -0.9, 0), (0, 0, 0), 0.4))
+
+
+@pytest.mark.parametrize("roughness", [0.0, 0.5])
+def test_a_metal_ball_in_a_furnace_reflects_all_of_its_colour(gl, roughness):
+    """Uniform radiance 1 around: the reflected light over the glossy colour is 1, ± 3 %, mirror or rough."""
+    scene = _enclosed(scenes.principled(Metallic=1.0, Roughness=roughness, Base_Color=(0.9, 0.7, 0.4), IOR=1.5))
+    p = vct(scene, "Glossy Indirect", "Glossy Color", samples=16, vct__emissive_voxels=True, resolution=(48, 27)).passes
+    middle = np.zeros(p["Glossy Color"].shape[:2], bool)
+    middle[9:18, 20:28] = True
+    assert p["Glossy Indirect"][middle].mean() == pytest.approx(1.0, abs=0.03)
+
+
+def test_ambient_occlusion_of_a_plane_is_open_and_of_a_box_is_closed(gl):
+    """1 on an open plane; about 0 deep in a closed box; ½ at the foot of an endless wall."""
+    plane = scenes.plane_scene(scenes.sun_light((0, 0, -1), 1.0))
+    p = vct(plane, "Ambient Occlusion", "Diffuse Color", samples=2, resolution=(48, 27)).passes
+    seen = p["Diffuse Color"][..., 0] > 0.79
+    assert p["Ambient Occlusion"][seen].mean() == pytest.approx(1.0, abs=0.01)
+    sphere = scenes.integrating_sphere()
+    assert vct(sphere, "Ambient Occlusion", samples=2, resolution=(48, 27)).passes["Ambient Occlusion"].mean() < 0.02
+
+
+def test_shadow_cones_agree_with_shadow_maps(gl):
+    """Direct light of a Cornell box with blocks: the mean within 5 %."""
+    scene = scenes.cornell()
+    maps, cones = (vct(scene, "Diffuse Direct", samples=4, vct__shadow_cones=c).passes["Diffuse Direct"] for c in (False, True))
+    assert cones.mean() == pytest.approx(maps.mean(), rel=0.05)
+    assert "Shadow Maps" not in {p.title for p in vct(scene, "Diffuse Direct", samples=1, vct__shadow_cones=True).plan.run}
+
+
+def test_a_clear_pane_shows_what_is_behind_it(gl):
+    """A pane of index 1 bends nothing: light through it is the wall's own behind it, in its tint; the mean within 5 %."""
+    def box(pane):
+        b = scenes.SceneBuilder()
+        b.quads(np.array([[[-2, 1, -2], [2, 1, -2], [2, 1, 2], [-2, 1, 2]]])[:, ::-1], scenes.diffuse((0.8,) * 3))
+        if pane:
+            glass = scenes.principled(Transmission_Weight=1.0, Roughness=0.0, IOR=1.0001, Base_Color=(1, 0.5, 0.25))
+            b.quads(np.array([[[-2, -1, -2], [2, -1, -2], [2, -1, 2], [-2, -1, 2]]]), glass)
+        b.light(scenes.point_light((0.3, 0.0, 0.2), 50.0))
+        return b.build(scenes.perspective((0, -3, 0), (0, 0, 0), 0.5))
+
+    bare = vct(box(False), "Combined", samples=4, resolution=(48, 27)).passes["Combined"][..., :3]
+    p = vct(box(True), "Transmission Indirect", "Transmission Color", samples=4, resolution=(48, 27)).passes
+    red, green, _ = p["Transmission Color"][13, 24]
+    assert green / red == pytest.approx(np.sqrt(0.5), rel=0.02)  # one of two surfaces
+    assert p["Transmission Indirect"].mean() == pytest.approx(bare.mean(), rel=0.05)
+
+
+def test_air_is_lit_and_shadowed_by_voxels(gl):
+    """Haze in a Cornell box with blocks: as much light as by the shadow maps, ± 5 %, and less than without shadows."""
+    scene = scenes.cornell(light="point")
+    haze = {"volume__density": 0.2, "samples": 4, "resolution": (48, 27)}
+    voxels = vct(scene, "Volume Direct", **haze)
+    maps = make(scene, "Volume Direct", **haze).passes["Volume Direct"].mean()
+    open_ = vct(scene, "Volume Direct", use_shadows=False, **haze).passes["Volume Direct"].mean()
+    assert voxels.passes["Volume Direct"].mean() == pytest.approx(maps, rel=0.05)
+    assert max(maps, voxels.passes["Volume Direct"].mean()) < 0.995 * open_
+    assert "Shadow Maps" not in {p.title for p in voxels.plan.run}
+
+
+OTHER = {
+    "vct.resolution": 16, "vct.cones": 2, "vct.emissive_voxels": True, "vct.shadow_cones": True,
+    "vct.continuous_voxelization": True,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("path", [p for p, _, _ in walk() if p.startswith("vct.")])
+def test_every_setting_changes_the_picture_or_the_plan(gl, path):
+    scene = scenes.cornell()
+    scene.materials[1] = scenes.emissive((1.0, 0.6, 0.3), 2.0)
+    base = vct(scene, "Combined", samples=2, resolution=(48, 27))
+    other = vct(scene, "Combined", samples=2, resolution=(48, 27), **{path.replace(".", "__"): OTHER[path]})
+    assert not np.array_equal(base.passes["Combined"], other.passes["Combined"]) or base.plan.text() != other.plan.text()
+
+
+@pytest.mark.parametrize(
+    ("off", "title"),
+    [("use_glossy", "Voxel Glossy Reflections"), ("use_ao", "Voxel Ambient Occlusion"),
+     ("use_translucency", "Voxel Translucency"), ("use_volumetric", "Voxel Volumetric Light")],
+)  # fmt: skip
+def test_every_effect_is_on_its_switch(gl, off, title):
+    scene = scenes.cornell()
+    scene.materials[0] = scenes.principled(Base_Color=scenes.WHITE, Roughness=0.3)
+    scene.materials.append(scenes.principled(Transmission_Weight=0.8, Roughness=0.1))
+    scene.instances.materials[-1] = (len(scene.materials) - 1,)
+
+    def titles(**changed):
+        settings = Settings()
+        settings.technique = "VCT"
+        settings.set("volume.density", 0.1)
+        for name, value in changed.items():
+            settings.set(name, value)
+        return {p.title for p in inspect(scene, settings, ("Combined", "Ambient Occlusion"), resolution=(64, 36)).run}
+
+    assert title in titles()
+    assert title not in titles(**{off: False})

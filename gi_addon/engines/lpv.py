@@ -46,18 +46,19 @@ _GROUP_RATIO = 16.0
 
 def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
     """Figure 4b, in order."""
+    injection = RadianceInjection()
     return [
         BRDFTables(),
         LightList(),
         ShadowMaps(),
         RSMGeneration(),
-        RadianceInjection(),
+        injection,
         GBuffer(),
         TranslucentLayer(),
         TranslucentBack(),
         TranslucentTint(),
         GeometryInjection(),
-        Propagation(settings.bounces),
+        Propagation(injection, settings.bounces),
         AmbientOcclusion(),
         AOBlur(),
         IndirectLighting(),
@@ -165,7 +166,10 @@ def _batch(facts: Facts) -> int:
 
 
 class RadianceInjection(Pass):
-    """Flux that the RSMs' texels reflect, into the cells in front of them."""
+    """Flux that the RSMs' texels reflect, into the cells in front of them.
+
+    Lights that are another point in each sub-frame are summed over the sub-frames so far; ``count`` says how many.
+    """
 
     title = "LPV Radiance Injection"
     figure = "LPV Radiance Injection"
@@ -180,7 +184,7 @@ class RadianceInjection(Pass):
         *_GRID,
         Uniform("tile", "int", "index of the view whose tile is injected"),
         Uniform("fixed_scale", "float", "units of fixed point per W"),
-        Uniform("first_group", "int", "1 where the sums are the volume's first"),
+        Uniform("first_group", "int", "1 where the volume starts anew with these sums"),
         *MEDIUM_UNIFORMS,
     )
     shaders = {
@@ -189,6 +193,9 @@ class RadianceInjection(Pass):
     }
     depends = ("lights", "world", "transforms", "meshes", "materials")
     settings = ("lpv.resolution", *_AIR_SETTINGS)
+
+    def __init__(self) -> None:
+        self.count = 0
 
     def rate(self, facts: Facts) -> str:
         return RSMGeneration().rate(facts)
@@ -205,13 +212,14 @@ class RadianceInjection(Pass):
         sample = frame.light_sample(bounce=True)
         flux = frame.resources["lpv.flux"]
         set_medium(frame, inject, facts)
+        self.count = 1 if planned.stale or frame.subframe == 0 else self.count + 1
         for first, (scale, lights) in enumerate(fixed_point_groups(sample.lights, grid(facts).cell)):
             flux.clear()
             for tile, view in enumerate(sample.views):
                 if int(view["light"]) in lights:
                     _set_grid(frame, inject, facts, tile=tile, fixed_scale=scale)
                     frame.compute(planned, inject, (int(view["rect"][2]), int(view["rect"][3])))
-            _set_grid(frame, source, facts, fixed_scale=scale, first_group=int(first == 0))
+            _set_grid(frame, source, facts, fixed_scale=scale, first_group=int(first == 0 and self.count == 1))
             frame.compute(planned, source, _sh_size(facts), (4, 4, 4))
 
 
@@ -305,7 +313,10 @@ class GeometryInjection(Pass):
 
 
 class Propagation(Pass):
-    """Light carried from cell to cell along each ordinate, and its harmonics in every cell."""
+    """Light carried from cell to cell along each ordinate, and its harmonics in every cell.
+
+    Where the sources are means over ever more sub-frames, it runs when there are twice as many as the last time.
+    """
 
     title = "LPV Propagation"
     figure = "LPV Propagation"
@@ -322,6 +333,7 @@ class Propagation(Pass):
         Uniform("batch_first", "int", "index of the batch's first ordinate"),
         Uniform("batch_count", "int", "ordinates in the batch"),
         Uniform("fixed_scale", "float", "units of fixed point per W"),
+        Uniform("source_scale", "float", "one over the sub-frames that the sources are summed over"),
         Uniform("bounced", "int", "1 to start from what the walls reflect too"),
         Uniform("medium_extinction", "vec3", "share of light lost per metre of the air"),
         Uniform("medium_scattering", "vec3", "share of light scattered per metre"),
@@ -338,7 +350,8 @@ class Propagation(Pass):
     depends = ("lights", "world", "transforms", "meshes", "materials")
     settings = ("lpv.resolution", "lpv.directions", "lpv.occlusion", "bounces", *_AIR_SETTINGS)
 
-    def __init__(self, bounces: int = 1) -> None:
+    def __init__(self, injection: RadianceInjection, bounces: int = 1) -> None:
+        self.injection = injection
         self.reads = ("lpv.source", Optional("lpv.walls"))
         if bounces > 1:
             self.reads += (Optional("lpv.albedo"),)
@@ -357,6 +370,8 @@ class Propagation(Pass):
 
     def run(self, frame: Frame, planned: Planned) -> None:
         facts = planned.facts
+        if not planned.stale and self.injection.count & (self.injection.count - 1):
+            return
         g = grid(facts)
         table = ordinates(int(facts.settings.lpv.directions))
         frame.upload("lpv.ordinates", table)
@@ -379,12 +394,11 @@ class Propagation(Pass):
                 frame.resources["lpv.reflected"].clear()
                 _set_grid(frame, reflect, facts, fixed_scale=scale)
                 frame.compute(planned, reflect, g.size, (4, 4, 4))
-                _set_grid(frame, bounced, facts, fixed_scale=scale)
+                _set_grid(frame, bounced, facts, fixed_scale=scale, source_scale=1.0 / max(self.injection.count, 1))
                 frame.compute(planned, bounced, _sh_size(facts), (4, 4, 4))
                 self._carry(frame, planned, table, bounced=True)
 
-    @staticmethod
-    def _carry(frame: Frame, planned: Planned, table: np.ndarray, *, bounced: bool) -> None:
+    def _carry(self, frame: Frame, planned: Planned, table: np.ndarray, *, bounced: bool) -> None:
         """Fill the volume from the sources: the first ones, or those that a bounce was added to."""
         facts = planned.facts
         g = grid(facts)
@@ -392,7 +406,8 @@ class Propagation(Pass):
         size = _batch(facts)
         for first in range(0, len(table), size):
             count = min(size, len(table) - first)
-            _set_grid(frame, expand, facts, batch_first=first, batch_count=count, bounced=int(bounced))
+            _set_grid(frame, expand, facts, batch_first=first, batch_count=count, bounced=int(bounced),
+                      source_scale=1.0 / max(self.injection.count, 1))
             frame.compute(planned, expand, (*g.size[:2], g.size[2] * count), (4, 4, 4))
             _set_grid(frame, carry, facts, batch_first=first, batch_count=count)
             for wave in range(sum(g.size) - 2):

@@ -62,12 +62,13 @@ float cone_end(Cone cone, Grid grid)
 // neighbours, by s/2. So s = D/2.
 float cone_level(Cone cone, Grid grid, float t)
 {
-    float width = cone.spread * (t + cone.apex);
+    float lod = log2(max(cone.spread * (t + cone.apex), 1e-6));
     float span = surface_reach(cone.n);
     if (span > 0.0) {
-        width = min(width, (cone.from.above + t * dot(cone.direction, cone.n)) / span);
+        // Of the two levels that are blended the coarser one must not reach the receiver.
+        lod = min(lod, floor(log2(max((cone.from.above + t * dot(cone.direction, cone.n)) / span, 1e-6))));
     }
-    return clamp(log2(max(width, 1e-6)), 0.0, grid.levels);
+    return clamp(lod, 0.0, grid.levels);
 }
 
 // Where all around is empty a cone takes four steps at once: a filtered 0 of three levels above says that nothing lies

@@ -63,7 +63,14 @@ void main()
         float beside = 0.0;  // rays that end near by
         for (int index = 0; index < view_count; ++index) {
             LightView v = rsm_views[index];
-            for (int i = 0; i < POINTS; ++i) {
+            // No point of the cell, a ball of radius √3/2 cells, is in a view whose span its middle lies farther outside of.
+            vec3 middle = light_view_project(v, center);
+            float radius = 0.867 * grid_cell;
+            float away = v.perspective > 0.5 ? middle.z - radius : 1.0;
+            float margin = radius / (away * min(length(v.axis_x), length(v.axis_y))) * (1.0 + max3(abs(vec3(middle.xy, 0.0))));
+            bool outside = v.perspective > 0.5 && middle.z + radius <= 0.0;
+            outside = outside || (away > 0.0 && max3(abs(vec3(middle.xy, 0.0))) > 1.0 + margin);
+            for (int i = 0; i < (outside ? 0 : POINTS); ++i) {
                 vec3 p = low + fract(0.5 + float(i) * R3) * grid_cell;
                 vec3 at = light_view_project(v, p);
                 if (any(greaterThan(abs(at.xy), vec2(1.0))) || (v.perspective > 0.5 && at.z <= 0.0)) {

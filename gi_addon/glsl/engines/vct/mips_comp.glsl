@@ -20,6 +20,15 @@ void main()
     ivec3 fine_size = 2 * coarse_size;
     int fine_level = coarse_level - 1;
     vec3 alpha = texelFetch(voxel_opacity, cell, coarse_level).rgb;
+    if (max3(alpha) <= 0.0) {
+        if (first_time == 1) {
+            for (int part = 0; part < 6; ++part) {
+                imageStore(coarser, part_texel(cell, coarse_size, part >> 1, part & 1), vec4(0.0));
+            }
+            imageStore(coarser_back, cell, vec4(0.0));
+        }
+        return;
+    }
     for (int part = 0; part < 6; ++part) {
         int axis = part >> 1;
         int side = part & 1;
