@@ -163,8 +163,12 @@ class LPVSettings:
         32, "Resolution", "Cells along the longest side of the scene", low=8, high=128, unit="cells",
         higher="finer indirect light, less leaking through walls", lower="faster",
     )  # fmt: skip
+    iterations: int = _setting(
+        0, "Iterations", "How many cells far light is carried; 0 is as far as it comes, at the cost of one iteration", low=0,
+        high=512, higher="reaches farther", lower="dark far from lit surfaces; slower than 0 all the same",
+    )  # fmt: skip
     directions: str = _setting(
-        "48", "Directions", "Directions that light travels in through the grid",
+        "72", "Directions", "Directions that light travels in through the grid",
         choices=(("48", "48", "Faster; small bright patches may show as rays"), ("72", "72", "Smoother")),
     )  # fmt: skip
     glossy_rays: int = _setting(
@@ -200,7 +204,7 @@ class SSDOSettings:
         low=0.01, high=10.0, higher="fewer leaks behind things", lower="light passes behind thin things",
     )  # fmt: skip
     occlusion: str = _setting(
-        "BITMASK", "Ambient Occlusion", "How the Ambient Occlusion pass is made",
+        "MITTRING", "Ambient Occlusion", "How the Ambient Occlusion pass is made",
         choices=(("BITMASK", "Visibility Bitmask", "Sectors of slices that samples fill"),
                  ("MITTRING", "Mittring", "Points along directions, as the other techniques and the paper do")),
     )  # fmt: skip

@@ -125,8 +125,17 @@ def main() -> None:
         write_sheet([p for p, code in rows if code == 0], arguments)
 
 
+_results: dict[Path, tuple] = {}
+
+
 def results(path: Path, arguments):
-    """(facts, test, reference, score) of a rendered scene."""
+    """(facts, test, reference, score) of a rendered scene, found once: FLIP takes its time."""
+    if path not in _results:
+        _results[path] = _find_results(path, arguments)
+    return _results[path]
+
+
+def _find_results(path: Path, arguments) -> tuple:
     from gi_addon.compare.metrics import score
 
     target = arguments.output / name_of(path)

@@ -98,7 +98,7 @@ def test_a_zip_has_the_wheels_of_its_platform_for_every_blender(zips, platform, 
             assert any(f"{package}-" in n and f"-{python}-" in n for n in wheels), f"{package} for {python}"
     assert {"blender_manifest.toml", "__init__.py", "LICENSE", "host/engine.py"} <= set(names)
     assert sum(n.endswith(".glsl") for n in names) == len(list((ROOT / "gi_addon" / "glsl").rglob("*.glsl")))
-    assert not any("cli" in n or "__pycache__" in n for n in names)
+    assert not any(Path(n).name.startswith(("cli", "__main__")) or "__pycache__" in n for n in names)
 
 
 @pytest.mark.blender

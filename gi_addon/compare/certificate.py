@@ -246,7 +246,7 @@ def certify(
     progress("walls")
     thickness = wall_thickness(scene)
     wall = float(np.percentile(thickness, 5)) if thickness.size else None
-    limit, leak = _wall_limit(settings.technique)
+    limit, leak = _wall_limit(settings)
     out.choices = closed_forms(scene, settings, plan, color, wall, limit)
     out.failures = predictions(scene, settings, color, wall, limit, leak, s)
     return out
@@ -279,11 +279,18 @@ def _remove(title, scene, settings, size, plan, measured, halves, error: float, 
     return Removal(title, other_error, other_ms, with_it, verdict)
 
 
-def _wall_limit(technique: str) -> tuple[float | None, float]:
+def _blind(settings: Settings) -> bool:
+    """Whether bounced light is not tested for visibility at all."""
+    return settings.technique == "RSM" and settings.as_dict().get("rsm.visibility") == "NONE"
+
+
+def _wall_limit(settings: Settings) -> tuple[float | None, float]:
     """The technique's w* by stability test 5, and its leak at two cells."""
     from .stability_checks import thin_wall
 
-    suite = Suite(technique)
+    suite = Suite(settings.technique)
+    if _blind(settings):
+        suite.base["rsm__visibility"] = "NONE"
     try:
         found = {q.name: q.value for q in thin_wall(suite).quantities}
     finally:
@@ -305,7 +312,7 @@ def predictions(
             f"with {settings.bounces} bounce{'s' * (settings.bounces != 1)} a closed room of this mean albedo ({mean:.2f}) lacks "
             f"{100 * missing:.0f} % of its indirect light"
         )
-    if not traits.blockers or (settings.as_dict().get("rsm.visibility") == "NONE" and settings.technique == "RSM"):
+    if not traits.blockers or _blind(settings):
         out.append(f"bounced light passes through walls (stability test 5: {100 * leak:.1f} % leak at a wall of two cells)")
     elif has_setting(traits.blockers) and wall and limit:
         bounds = scene.bounds()

@@ -46,18 +46,19 @@ _GROUP_RATIO = 16.0
 
 def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
     """Figure 4b, in order."""
+    injection = RadianceInjection()
     return [
         BRDFTables(),
         LightList(),
         ShadowMaps(),
         RSMGeneration(),
-        RadianceInjection(),
+        injection,
         GBuffer(),
         TranslucentLayer(),
         TranslucentBack(),
         TranslucentTint(),
         GeometryInjection(),
-        Propagation(settings.bounces),
+        Propagation(injection, settings.bounces, settings.lpv.iterations),
         AmbientOcclusion(),
         AOBlur(),
         IndirectLighting(),
@@ -165,7 +166,10 @@ def _batch(facts: Facts) -> int:
 
 
 class RadianceInjection(Pass):
-    """Flux that the RSMs' texels reflect, into the cells in front of them."""
+    """Flux that the RSMs' texels reflect, into the cells in front of them.
+
+    Lights that are another point in each sub-frame are summed over the sub-frames so far; ``count`` says how many.
+    """
 
     title = "LPV Radiance Injection"
     figure = "LPV Radiance Injection"
@@ -180,7 +184,7 @@ class RadianceInjection(Pass):
         *_GRID,
         Uniform("tile", "int", "index of the view whose tile is injected"),
         Uniform("fixed_scale", "float", "units of fixed point per W"),
-        Uniform("first_group", "int", "1 where the sums are the volume's first"),
+        Uniform("first_group", "int", "1 where the volume starts anew with these sums"),
         *MEDIUM_UNIFORMS,
     )
     shaders = {
@@ -189,6 +193,9 @@ class RadianceInjection(Pass):
     }
     depends = ("lights", "world", "transforms", "meshes", "materials")
     settings = ("lpv.resolution", *_AIR_SETTINGS)
+
+    def __init__(self) -> None:
+        self.count = 0
 
     def rate(self, facts: Facts) -> str:
         return RSMGeneration().rate(facts)
@@ -205,13 +212,14 @@ class RadianceInjection(Pass):
         sample = frame.light_sample(bounce=True)
         flux = frame.resources["lpv.flux"]
         set_medium(frame, inject, facts)
+        self.count = 1 if planned.stale or frame.subframe == 0 else self.count + 1
         for first, (scale, lights) in enumerate(fixed_point_groups(sample.lights, grid(facts).cell)):
             flux.clear()
             for tile, view in enumerate(sample.views):
                 if int(view["light"]) in lights:
                     _set_grid(frame, inject, facts, tile=tile, fixed_scale=scale)
                     frame.compute(planned, inject, (int(view["rect"][2]), int(view["rect"][3])))
-            _set_grid(frame, source, facts, fixed_scale=scale, first_group=int(first == 0))
+            _set_grid(frame, source, facts, fixed_scale=scale, first_group=int(first == 0 and self.count == 1))
             frame.compute(planned, source, _sh_size(facts), (4, 4, 4))
 
 
@@ -305,7 +313,10 @@ class GeometryInjection(Pass):
 
 
 class Propagation(Pass):
-    """Light carried from cell to cell along each ordinate, and its harmonics in every cell."""
+    """Light carried from cell to cell along each ordinate, and its harmonics in every cell.
+
+    Where the sources are means over ever more sub-frames, it runs when there are twice as many as the last time.
+    """
 
     title = "LPV Propagation"
     figure = "LPV Propagation"
@@ -322,11 +333,12 @@ class Propagation(Pass):
         Uniform("batch_first", "int", "index of the batch's first ordinate"),
         Uniform("batch_count", "int", "ordinates in the batch"),
         Uniform("fixed_scale", "float", "units of fixed point per W"),
+        Uniform("source_scale", "float", "one over the sub-frames that the sources are summed over"),
         Uniform("bounced", "int", "1 to start from what the walls reflect too"),
         Uniform("medium_extinction", "vec3", "share of light lost per metre of the air"),
         Uniform("medium_scattering", "vec3", "share of light scattered per metre"),
         Uniform("medium_anisotropy", "float", "mean cosine of the scattering angle"),
-        Uniform("wave", "int", "the diagonal plane whose cells take their light"),
+        Uniform("wave", "int", "the diagonal plane whose cells take their light, or the iteration"),
     )
     shaders = {
         "expand": {"compute": "engines/lpv/expand_comp.glsl"},
@@ -336,9 +348,10 @@ class Propagation(Pass):
         "bounced": {"compute": "engines/lpv/bounced_comp.glsl"},
     }
     depends = ("lights", "world", "transforms", "meshes", "materials")
-    settings = ("lpv.resolution", "lpv.directions", "lpv.occlusion", "bounces", *_AIR_SETTINGS)
+    settings = ("lpv.resolution", "lpv.directions", "lpv.iterations", "lpv.occlusion", "bounces", *_AIR_SETTINGS)
 
-    def __init__(self, bounces: int = 1) -> None:
+    def __init__(self, injection: RadianceInjection, bounces: int = 1, iterations: int = 0) -> None:
+        self.injection = injection
         self.reads = ("lpv.source", Optional("lpv.walls"))
         if bounces > 1:
             self.reads += (Optional("lpv.albedo"),)
@@ -348,15 +361,28 @@ class Propagation(Pass):
                 Buffer("lpv.reflected", "lpv_reflected", "what the walls reflect in fixed point: cell, harmonic, colour", "int",
                        np.dtype("i4"), lambda f: grid(f).cells * SH_COUNT * 3, scratch=True),
             )  # fmt: skip
+        if iterations:
+            size = self.writes[1].size
+            self.writes += (
+                Texture("lpv.emitted", "lpv_emitted", "what the cells emit along each ordinate, W/(m²·sr)", "rgba32f", size,
+                        access="readwrite", scratch=True),
+                Texture("lpv.carried", "lpv_carried", "lpv.radiance after one iteration more", "rgba32f", size,
+                        access="readwrite", scratch=True),
+            )  # fmt: skip
 
     def rate(self, facts: Facts) -> str:
         return RSMGeneration().rate(facts)
 
     def defines(self, facts: Facts) -> dict[str, int]:
-        return {"HAS_LPV_BOUNCED": int(facts.settings.bounces > 1), **medium_defines(facts)}
+        return {
+            "HAS_LPV_BOUNCED": int(facts.settings.bounces > 1), "LPV_LIMITED": int(facts.settings.lpv.iterations > 0),
+            **medium_defines(facts),
+        }  # fmt: skip
 
     def run(self, frame: Frame, planned: Planned) -> None:
         facts = planned.facts
+        if not planned.stale and self.injection.count & (self.injection.count - 1):
+            return
         g = grid(facts)
         table = ordinates(int(facts.settings.lpv.directions))
         frame.upload("lpv.ordinates", table)
@@ -379,12 +405,11 @@ class Propagation(Pass):
                 frame.resources["lpv.reflected"].clear()
                 _set_grid(frame, reflect, facts, fixed_scale=scale)
                 frame.compute(planned, reflect, g.size, (4, 4, 4))
-                _set_grid(frame, bounced, facts, fixed_scale=scale)
+                _set_grid(frame, bounced, facts, fixed_scale=scale, source_scale=1.0 / max(self.injection.count, 1))
                 frame.compute(planned, bounced, _sh_size(facts), (4, 4, 4))
                 self._carry(frame, planned, table, bounced=True)
 
-    @staticmethod
-    def _carry(frame: Frame, planned: Planned, table: np.ndarray, *, bounced: bool) -> None:
+    def _carry(self, frame: Frame, planned: Planned, table: np.ndarray, *, bounced: bool) -> None:
         """Fill the volume from the sources: the first ones, or those that a bounce was added to."""
         facts = planned.facts
         g = grid(facts)
@@ -392,15 +417,34 @@ class Propagation(Pass):
         size = _batch(facts)
         for first in range(0, len(table), size):
             count = min(size, len(table) - first)
-            _set_grid(frame, expand, facts, batch_first=first, batch_count=count, bounced=int(bounced))
+            _set_grid(frame, expand, facts, batch_first=first, batch_count=count, bounced=int(bounced),
+                      source_scale=1.0 / max(self.injection.count, 1))
             frame.compute(planned, expand, (*g.size[:2], g.size[2] * count), (4, 4, 4))
             _set_grid(frame, carry, facts, batch_first=first, batch_count=count)
-            for wave in range(sum(g.size) - 2):
-                carry["wave"].value = wave
-                carry.run(-(-g.size[0] // 8), -(-g.size[1] // 8), count)
-                frame.gl.ctx.memory_barrier(moderngl.SHADER_IMAGE_ACCESS_BARRIER_BIT)
+            if facts.settings.lpv.iterations:
+                self._iterate(frame, planned, carry, count)
+            else:
+                for wave in range(sum(g.size) - 2):
+                    carry["wave"].value = wave
+                    carry.run(-(-g.size[0] // 8), -(-g.size[1] // 8), count)
+                    frame.gl.ctx.memory_barrier(moderngl.SHADER_IMAGE_ACCESS_BARRIER_BIT)
             _set_grid(frame, gather, facts, batch_first=first, batch_count=count)
             frame.compute(planned, gather, g.size, (4, 4, 4))
+
+    @staticmethod
+    def _iterate(frame: Frame, planned: Planned, carry, count: int) -> None:
+        """The paper's iteration: all cells at once, one cell farther each time. The last one writes ``lpv.radiance``."""
+        g = grid(planned.facts)
+        textures = planned.texture_writes()
+        slots = {t.name: slot for slot, t in enumerate(textures)}
+        last = planned.facts.settings.lpv.iterations
+        for iteration in range(last + 1):
+            pair = ("lpv.carried", "lpv.radiance") if (last - iteration) % 2 == 0 else ("lpv.radiance", "lpv.carried")
+            for name, slot in zip(pair, (slots["lpv.radiance"], slots["lpv.carried"]), strict=True):
+                frame.resources[name].bind_to_image(slot, read=True, write=True)
+            carry["wave"].value = iteration
+            carry.run(-(-g.size[0] // 8), -(-g.size[1] // 8), g.size[2] * count)
+            frame.gl.ctx.memory_barrier(moderngl.SHADER_IMAGE_ACCESS_BARRIER_BIT)
 
 
 class IndirectLighting(Pass):

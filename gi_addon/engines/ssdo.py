@@ -454,10 +454,8 @@ class RadialBlur(Volumetric):
 
     def defines(self, facts: Facts) -> dict[str, int]:
         # Without the camera's surfaces there is nothing in the way.
-        return {
-            "RADIAL_BLUR": int(facts.visible), "VOXEL_VISIBILITY": 0, "HAS_LIGHT_VIEWS": 0, "HAS_SHADOW_DEPTH": 0,
-            "HAS_RSM_DEPTH": 0,
-        }  # fmt: skip
+        maps = {"VOXEL_VISIBILITY": 0, "HAS_LIGHT_VIEWS": 0, "HAS_SHADOW_DEPTH": 0, "HAS_RSM_DEPTH": 0}
+        return {"RADIAL_BLUR": int(facts.visible), **maps}
 
     def run(self, frame: Frame, planned: Planned) -> None:
         if frame.subframe == 0:

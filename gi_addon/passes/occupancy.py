@@ -84,7 +84,7 @@ class Occupancy(Pass):
         facts, grid = planned.facts, cell_grid(planned.facts)
         cells, free = frame.resources["occupancy.cells"], frame.resources["occupancy"]
         ctx = frame.gl.ctx
-        self._clear(frame, planned, cells, grid)
+        cells.write(bytes(int(np.prod(grid.size))))
         fbo = frame.pool.framebuffer([frame.resources["occupancy.target"]])
         fbo.use()
         ctx.enable_only(moderngl.NOTHING)
@@ -122,7 +122,3 @@ class Occupancy(Pass):
         free.bind_to_image(0, read=False, write=True)
         frame.program(planned, "levels").run(*(-(-s // 4) for s in grid.size))
         ctx.memory_barrier(moderngl.ALL_BARRIER_BITS)
-
-    @staticmethod
-    def _clear(frame: Frame, planned: Planned, cells, grid: CellGrid) -> None:
-        cells.write(bytes(int(np.prod(grid.size))))

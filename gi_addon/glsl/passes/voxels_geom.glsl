@@ -26,14 +26,14 @@ in vec3 corner_generated[];
 flat in vec4 corner_color[];
 flat in vec2 corner_info[];
 flat in vec3 corner_location[];
-flat in mat3 corner_world_from_object_normal[];
+flat in mat3 corner_world_from_object[];
 out vec3 vary_position_os;
 out vec3 vary_normal_os;
 out vec3 vary_generated;
 flat out vec4 vary_color;
 flat out vec2 vary_info;
 flat out vec3 vary_location;
-flat out mat3 vary_world_from_object_normal;
+flat out mat3 vary_world_from_object;
 #endif
 #if SURFACE_ATTRIBUTES > 0
 in vec4 corner_attribute_0[];
@@ -82,7 +82,7 @@ void emit(int i, vec2 p, vec3 a, vec3 b, vec3 c, int axis, vec3 normal, vec2 spa
     vary_color = corner_color[i];
     vary_info = corner_info[i];
     vary_location = corner_location[i];
-    vary_world_from_object_normal = corner_world_from_object_normal[i];
+    vary_world_from_object = corner_world_from_object[i];
 #endif
 #if SURFACE_ATTRIBUTES > 0
     vary_attribute_0 = corner_attribute_0[i];

@@ -10,7 +10,7 @@
 #define vary_color corner_color
 #define vary_info corner_info
 #define vary_location corner_location
-#define vary_world_from_object_normal corner_world_from_object_normal
+#define vary_world_from_object corner_world_from_object
 #define vary_attribute_0 corner_attribute_0
 #define vary_attribute_1 corner_attribute_1
 #define vary_attribute_2 corner_attribute_2

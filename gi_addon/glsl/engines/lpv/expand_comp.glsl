@@ -18,11 +18,15 @@ void main()
     for (int c = 0; c < SH_COUNT; ++c) {
         ivec3 texel = ivec3(at.xy, z + c * grid_size.z);
 #if HAS_LPV_BOUNCED
-        vec3 value = bounced == 1 ? imageLoad(lpv_bounced, texel).rgb : texelFetch(lpv_source, texel, 0).rgb;
+        vec3 value = bounced == 1 ? imageLoad(lpv_bounced, texel).rgb : source_scale * texelFetch(lpv_source, texel, 0).rgb;
 #else
-        vec3 value = texelFetch(lpv_source, texel, 0).rgb;
+        vec3 value = source_scale * texelFetch(lpv_source, texel, 0).rgb;
 #endif
         sum += value * y[c];
     }
+#if LPV_LIMITED
+    imageStore(lpv_emitted, at, vec4(sum, 0.0));
+#else
     imageStore(lpv_radiance, at, vec4(sum, 0.0));
+#endif
 }

@@ -1,6 +1,7 @@
 // One wave of the propagation: cells on a plane i + j + k = wave, counted along each ordinate's own octant, take what their
 // up to three upwind neighbours send. After nx + ny + nz − 2 waves every cell has all its light, however far it came: this is
-// the paper's iteration with each cell computed once, when its sources are complete.
+// the paper's iteration with each cell computed once, when its sources are complete. With a number of iterations set
+// (LPV_LIMITED) all cells take their neighbours' light at once, so many times: light then comes that many cells far.
 //
 // Balance of a cell of edge h for the ordinate ω with outgoing radiance L (donor-cell discretisation of ω·∇L = Q):
 //     L h² (|ωx| + |ωy| + |ωz|) = h² Σ_a |ω_a| (1 − κ_a) L_a + Q(ω)
@@ -26,9 +27,14 @@ layout(local_size_x = 8, local_size_y = 8) in;
 
 void main()
 {
-    int ordinate = int(gl_GlobalInvocationID.z);
     ivec3 local = ivec3(gl_GlobalInvocationID.xy, 0);
+#if LPV_LIMITED
+    int ordinate = int(gl_GlobalInvocationID.z) / grid_size.z;
+    local.z = int(gl_GlobalInvocationID.z) - ordinate * grid_size.z;
+#else
+    int ordinate = int(gl_GlobalInvocationID.z);
     local.z = wave - local.x - local.y;
+#endif
     if (!inside_grid(local, grid_size) || ordinate >= batch_count) {
         return;
     }
@@ -38,7 +44,11 @@ void main()
                        up.z ? local.z : grid_size.z - 1 - local.z);
     vec3 share = abs(w);
     int slab = ordinate * grid_size.z;
+#if LPV_LIMITED
+    vec3 flux = imageLoad(lpv_emitted, cell + ivec3(0, 0, slab)).rgb;
+#else
     vec3 flux = imageLoad(lpv_radiance, cell + ivec3(0, 0, slab)).rgb;
+#endif
     float whole = share.x + share.y + share.z;
     vec3 kept = vec3(1.0);
 #if HAS_MEDIUM
@@ -66,6 +76,9 @@ void main()
             }
 #endif
             vec4 neighbour = imageLoad(lpv_radiance, from + ivec3(0, 0, slab));
+#if LPV_LIMITED
+            neighbour *= float(wave > 0); // before the first iteration a cell has only what it emits
+#endif
             flux += (share[axis] * (1.0 - coverage) * neighbour.a) * neighbour.rgb * kept;
         }
 #if HAS_LPV_WALLS
@@ -84,5 +97,9 @@ void main()
     // A cell whose every face is a wall that the light leaves, or none of them one it could come from, has no cross-section.
     section = section > 1e-3 * whole ? section : whole;
     float passed = open_ahead > section ? section / open_ahead : 1.0;
+#if LPV_LIMITED
+    imageStore(lpv_carried, cell + ivec3(0, 0, slab), vec4(flux / section, passed));
+#else
     imageStore(lpv_radiance, cell + ivec3(0, 0, slab), vec4(flux / section, passed));
+#endif
 }

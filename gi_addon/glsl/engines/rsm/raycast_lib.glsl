@@ -25,15 +25,7 @@ const float NO_SURFACE = 1e30;
 // point is behind it. `known` is false outside the light's maps.
 float rsm_gap(Light light, vec3 position_ws, out bool known, out int index, out ivec2 texel)
 {
-    index = light.first_view;
-    float deepest = -NO_SURFACE;
-    for (int k = 0; k < light.views; ++k) {
-        float d = dot(position_ws - rsm_views[light.first_view + k].origin_ws, rsm_views[light.first_view + k].axis_z);
-        if (d > deepest) {
-            deepest = d;
-            index = light.first_view + k;
-        }
-    }
+    index = rsm_view_of(light, position_ws);
     LightView v = rsm_views[index];
     vec3 p = light_view_project(v, position_ws);
     known = p.z > v.near && all(lessThan(abs(p.xy), vec2(1.0)));

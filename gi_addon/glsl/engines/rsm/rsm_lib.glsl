@@ -16,6 +16,22 @@ struct RsmTexel {
 // The grazing limit of a texel's surface: beyond it the plane would leave the texel's neighbours too (cos 88.9°).
 const float GRAZING_COS = 0.02;
 
+// Which of a light's bounce maps shows a point: the face with the largest depth.
+int rsm_view_of(Light light, vec3 position_ws)
+{
+    int best = light.first_view;
+    float deepest = -1e30;
+    for (int k = 0; k < light.views; ++k) {
+        LightView v = rsm_views[light.first_view + k];
+        float d = dot(position_ws - v.origin_ws, v.axis_z);
+        if (d > deepest) {
+            deepest = d;
+            best = light.first_view + k;
+        }
+    }
+    return best;
+}
+
 // What texel `pixel` of view `index` reflects. A surface of area A under the beam's cross-section B at angle θ has
 // A = B / cosθ; shading normals take irradiance by their own cosine, so Φ = albedo · E · cos θ_shading · A. A flat-shaded
 // surface gives Φ = albedo × the arriving flux.

@@ -23,16 +23,7 @@ vec3 profile(float r, vec3 d)
 // Where the light on its way to `q` first meets a surface; false where the map does not know.
 bool entry_point(Light light, vec3 q, out vec3 y)
 {
-    int index = light.first_view;
-    float deepest = -1e30;
-    for (int k = 0; k < light.views; ++k) {
-        float depth = dot(q - rsm_views[light.first_view + k].origin_ws, rsm_views[light.first_view + k].axis_z);
-        if (depth > deepest) {
-            deepest = depth;
-            index = light.first_view + k;
-        }
-    }
-    LightView v = rsm_views[index];
+    LightView v = rsm_views[rsm_view_of(light, q)];
     vec3 p = light_view_project(v, q);
     y = q;
     if (p.z <= v.near || any(greaterThan(abs(p.xy), vec2(1.0)))) {
