@@ -52,12 +52,11 @@ TRAITS: dict[str, Traits] = {
 
 # Failures that are known, with their causes: shown beside the verdict. A test that fails and is not listed here fails the
 # test suite too.
-# The two named causes were tried: `gather_scale` 1, or 16 sub-frames, make that test pass. The others are measured only.
+# The named causes were tried: `gather_scale` 1, or 16 sub-frames, make that test pass. The others are measured only.
 _GATHER = "the low-resolution gather moves with the pixels, a block of them being as large as the corner; gather_scale 1 passes"
 _NOISE = "one sub-frame is noise that moves with the camera; 16 sub-frames and gather_scale 1 pass"
 KNOWN: dict[tuple[str, str], str] = {
-    **dict.fromkeys((("RSM", "6"), ("RSM", "7"), ("RSM", "8"), ("RSM", "13")), _GATHER),
-    **dict.fromkeys((("SSDO", "8"), ("SSDO", "11"), ("SSDO", "13"), ("VCT", "8"), ("VCT", "9")), _GATHER),
+    **dict.fromkeys((("SSDO", "8"), ("VCT", "9")), _GATHER),
     **dict.fromkeys((("SSDO", "6"), ("SSDO", "7"), ("VCT", "6")), _NOISE),
     ("SSDO", "10"): "directions differ from pixel to pixel: 16 sub-frames leave 1.8 % of noise",
     ("LPV", "1"): "a lamp 0.2 R from the wall: g = 0.85 in a grid of 32 cells; lamps further off pass",
