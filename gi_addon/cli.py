@@ -54,7 +54,7 @@ class _Resolution(click.ParamType):
 
 def _scene_options(function):
     for option in reversed((
-        click.option("--technique", type=str, help="Technique: rsm."),
+        click.option("--technique", type=str, help="Technique: rsm, lpv, vct or ssdo."),
         click.option("--samples", type=int, help="Sub-frames averaged."),
         click.option("--resolution", type=_Resolution(), help="Picture size, e.g. 640x360."),
         click.option("--frame", type=int, help="Animation frame."),
