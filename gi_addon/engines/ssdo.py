@@ -21,9 +21,10 @@ from ..graph import Optional, Pass, Planned, Texture, Uniform
 from ..passes.ao import AOBlur, AOGeneration
 from ..passes.brdf_tables import BRDFTables
 from ..passes.direct_lighting import DirectLighting
-from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint, _screen, gather_size
+from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint, _screen
 from ..passes.lights import LightList, ShadowMaps
 from ..passes.resolve import Resolve
+from ..passes.smoothing import LIGHT, BlockSmoothing, raw_gather
 from ..passes.volumetric import Volumetric
 from ..settings import Settings
 
@@ -36,7 +37,7 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         bounces += [
             SentLight(bounce),
             InterpolatedIndirect(f"ssdo.sent.{bounce}", f"ssdo.low.{bounce}"),
-            Smoothing(f"ssdo.sent.{bounce}", f"ssdo.low.{bounce}"),
+            _smoothing(f"ssdo.sent.{bounce}", f"ssdo.low.{bounce}"),
             IndirectLighting(f"ssdo.sent.{bounce}", f"ssdo.low.{bounce}",
                              "indirect.diffuse" if last else f"ssdo.bounce.{bounce}"),
         ]  # fmt: skip
@@ -51,7 +52,7 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         AOGeneration() if settings.ssdo.occlusion == "MITTRING" else AOScan(),
         AOBlur(),
         InterpolatedIndirect("gbuffer.emission", "screen.low"),
-        Smoothing("gbuffer.emission", "screen.low"),
+        _smoothing("gbuffer.emission", "screen.low"),
         IndirectLighting("gbuffer.emission", "screen.low", "screen.light"),
         DirectLighting() if settings.ssdo.shadows == "MAPS" or not settings.use_shadows else ScreenShadowLighting(),
         *bounces,
@@ -70,7 +71,6 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
 # What a gather takes, and what it makes (gather_lib.glsl, lighting_frag.glsl).
 _SENT = {"SENT_NOTHING": 0, "SENT_BOUNCE": 1, "SENT_EMISSION": 2}
 _TARGET = {"TARGET_INDIRECT": 0, "TARGET_BOUNCE": 1, "TARGET_SCREEN_LIGHT": 2}
-_LIGHT = "radiance a white Lambert surface would reflect, W/(m²·sr)"
 
 
 def _no_bounce(facts: Facts) -> str | None:
@@ -178,36 +178,10 @@ class InterpolatedIndirect(_Gather):
         self.sent = sent
         self.title = f"{_title(sent)} (low resolution)"
         self.reads = ("ssdo.planes", _read(sent), "gbuffer.low_depth", "gbuffer.low_normal", "gbuffer.low_pixel")
-        self.writes = (
-            Texture(f"{low}.raw", "raw_indirect", _LIGHT, "rgba32f", gather_size, scratch=True),
-            Texture(f"{low}.raw_direction", "raw_direction", "Σ luminance × direction, and Σ luminance, of what arrives",
-                    "rgba32f", gather_size, scratch=True),
-        )  # fmt: skip
+        self.writes = raw_gather(low)
 
     def absent(self, facts: Facts) -> str | None:
         return super().absent(facts) or (None if facts.settings.gather_scale > 1 else "every pixel gathers for itself")
-
-
-class Smoothing(Pass):
-    """Neighbouring blocks of one surface share their directions."""
-
-    figure = "Gaussian Blur"
-    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/ssdo/smooth_frag.glsl"}}
-
-    def __init__(self, sent: str, low: str) -> None:
-        self.title = f"{_title(sent)} (smoothing)"
-        self.reads = (f"{low}.raw", f"{low}.raw_direction", "gbuffer.low_depth", "gbuffer.low_normal", "gbuffer.low_pixel")
-        self.writes = (
-            Texture(low, "low_indirect", _LIGHT, "rgba32f", gather_size, scratch=True),
-            Texture(f"{low}.direction", "low_direction", "Σ luminance × direction, and Σ luminance, of what arrives", "rgba32f",
-                    gather_size, scratch=True),
-        )  # fmt: skip
-
-    def defines(self, facts: Facts) -> dict[str, int]:
-        return {"GATHER_SCALE": facts.settings.gather_scale}
-
-    def run(self, frame: Frame, planned: Planned) -> None:
-        frame.screen(planned, frame.program(planned))
 
 
 class IndirectLighting(_Gather):
@@ -225,7 +199,7 @@ class IndirectLighting(_Gather):
             Optional("gbuffer.low_normal"), Optional("gbuffer.low_pixel"), Optional(low), Optional(f"{low}.direction"),
         )  # fmt: skip
         glsl = {"INDIRECT": "indirect_diffuse", "SCREEN_LIGHT": "screen_light", "BOUNCE": "last_bounce"}[self.target]
-        self.writes = (Texture(target, glsl, _LIGHT, "rgba32f", _screen),)
+        self.writes = (Texture(target, glsl, LIGHT, "rgba32f", _screen),)
 
     def defines(self, facts: Facts) -> dict[str, int]:
         return {**super().defines(facts), **_TARGET, "TARGET": _TARGET[f"TARGET_{self.target}"]}
@@ -233,6 +207,10 @@ class IndirectLighting(_Gather):
 
 def _title(sent: str) -> str:
     return f"SSDO Bounce {sent.rsplit('.', 1)[1]}" if sent.startswith("ssdo.") else "SSDO Directional Occlusion"
+
+
+def _smoothing(sent: str, low: str) -> BlockSmoothing:
+    return BlockSmoothing(low, f"{_title(sent)} (smoothing)", "Gaussian Blur")
 
 
 def _read(sent: str) -> str | Optional:

@@ -13,10 +13,11 @@ from ..frame import Frame
 from ..graph import Optional, Pass, Planned, Texture, Uniform
 from ..passes.brdf_tables import BRDFTables
 from ..passes.direct_lighting import DirectLighting
-from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint, _screen, gather_size
+from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint, _screen
 from ..passes.lights import LightList, RSMGeneration, ShadowMaps
 from ..passes.occupancy import Occupancy
 from ..passes.resolve import Resolve
+from ..passes.smoothing import LIGHT, BlockSmoothing, raw_gather
 from ..passes.volumetric import MEDIUM_UNIFORMS, Volumetric, medium_defines, set_medium
 from ..passes.voxels import GRID_UNIFORMS, VoxelGrid, Voxelisation, voxel_grid
 from ..passes.world_guide import WorldGuide
@@ -45,6 +46,7 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         GBufferMips(),
         VoxelAO(),
         InterpolatedIndirect(),
+        BlockSmoothing("indirect.low", "Voxel Interpolated Indirect Lighting (smoothing)"),
         IndirectLighting(),
         GlossyCones(),
         *([ShadowCones()] if settings.vct.shadow_cones else []),
@@ -238,12 +240,7 @@ class InterpolatedIndirect(Pass):
 
     title = "Voxel Interpolated Indirect Lighting Computation"
     reads = (*_VOLUMES, "gbuffer.low_depth", "gbuffer.low_normal", "gbuffer.low_pixel")
-    writes = (
-        Texture("indirect.low", "low_indirect", "radiance a white Lambert surface would reflect, W/(m²·sr)", "rgba32f",
-                gather_size, scratch=True),
-        Texture("indirect.low_direction", "low_direction", "Σ luminance × direction, and Σ luminance, of what arrives",
-                "rgba32f", gather_size, scratch=True),
-    )  # fmt: skip
+    writes = raw_gather("indirect.low")
     uniforms = _CONE_UNIFORMS
     shaders = {"main": {"vertex": _FULLSCREEN, "fragment": "engines/vct/gather_low_frag.glsl"}}
 
@@ -268,11 +265,11 @@ class IndirectLighting(Pass):
     figure = "Voxel Lighting Computation"
     reads = (
         *_VOLUMES, "gbuffer.depth", "gbuffer.normal", Optional("gbuffer.low_depth"), Optional("gbuffer.low_normal"),
-        Optional("gbuffer.low_pixel"), Optional("indirect.low"), Optional("indirect.low_direction"),
+        Optional("gbuffer.low_pixel"), Optional("indirect.low"), Optional("indirect.low.direction"),
     )  # fmt: skip
     writes = (
-        Texture("indirect.diffuse", "indirect_diffuse", "radiance a white Lambert surface would reflect, W/(m²·sr)",
-                "rgba32f", _screen, when=lambda f: None if f.diffuse else "no visible material is diffuse"),
+        Texture("indirect.diffuse", "indirect_diffuse", LIGHT, "rgba32f", _screen,
+                when=lambda f: None if f.diffuse else "no visible material is diffuse"),
     )  # fmt: skip
     uniforms = _CONE_UNIFORMS
     shaders = {"main": {"vertex": _FULLSCREEN, "fragment": "engines/vct/lighting_frag.glsl"}}

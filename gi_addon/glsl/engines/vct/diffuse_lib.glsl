@@ -1,16 +1,13 @@
 // Light on a surface by a set of cones. Included where `voxel_radiance`, the grid and `cone_count` are declared, after
 // view_lib and sequence_lib.
 //
-// N cones of weight π/N each: directions on N rings of equal area of the unit disc, lifted to the hemisphere, are
+// N cones of weight π/N each: directions spread evenly over the unit disc, lifted to the hemisphere, are
 // cosine-distributed (Malley's method), and weights sum to π. Each cone is as wide as its share: a cone of half angle θ has
-// projected solid angle π sin²θ = π/N. Their places turn and shift with the sub-frames, so that all of these
-// together are one finer set, and each may be narrower.
+// projected solid angle π sin²θ = π/N. All sub-frames' cones together are one finer set, and each may be narrower.
 
 #include "engines/vct/cone_lib.glsl"
 
 Grid voxel_grid() { return Grid(grid_low, grid_cell, vec3(grid_size), grid_levels); }
-
-const float GOLDEN_ANGLE = 2.39996322972865; // π (3 − √5)
 
 struct Gathered {
     vec3 radiance;    // E/π, W/(m²·sr)
@@ -26,14 +23,17 @@ float cone_spread(int count)
 
 float cone_phase() { return view.subframes > 1u ? sobol_2d(view.subframe, 41u).x : 0.0; }
 
-// Direction `i` of `count` about +z. Where the result is interpolated, neighbours turn their sets apart by sixteenths: what one
-// set misses is no streak.
+// Direction `i` of `count` about +z: the next points of the R2 sequence in each sub-frame (M. Roberts, "The Unreasonable
+// Effectiveness of Quasirandom Sequences", 2018: multiples of 1/g and 1/g², g³ = g + 1, here in units of 2^−32), whose every run
+// is even. `turned`: 2 × 2 neighbours have runs one after another, and the tent of passes/smooth_blocks_frag.glsl weighs the
+// four alike wherever it stands.
 vec3 cone_direction(int i, int count, bool turned)
 {
-    vec2 shift = view.subframes > 1u ? sobol_2d(view.subframe, 40u) : vec2(0.5);
-    uvec2 place = uvec2(gl_FragCoord.xy) & 3u;
-    float r2 = (float(i) + shift.x) / float(count);
-    float phi = GOLDEN_ANGLE * float(i) + TAU * (shift.y + (turned ? float(place.x + 4u * place.y) / 16.0 : 0.0));
+    uvec2 place = uvec2(gl_FragCoord.xy) & 1u;
+    uint run = turned ? place.x + 2u * place.y : 0u;
+    uint j = (run * uint(cone_sets) + view.subframe) * uint(count) + uint(i);
+    float r2 = unit_float(j * 3242174889u + 0x80000000u);
+    float phi = TAU * unit_float(j * 2447445414u + 0x80000000u);
     return vec3(sqrt(r2) * vec2(cos(phi), sin(phi)), sqrt(1.0 - r2));
 }
 

@@ -9,8 +9,8 @@ void main()
 {
     ivec2 block = ivec2(gl_FragCoord.xy);
     float depth = texelFetch(low_depth, block, 0).r;
-    low_indirect = vec4(0.0);
-    low_direction = vec4(0.0);
+    raw_indirect = vec4(0.0);
+    raw_direction = vec4(0.0);
     if (depth <= 0.0) {
         return;
     }
@@ -18,6 +18,6 @@ void main()
     vec4 normals = texelFetch(low_normal, block, 0);
     Gathered g = gather_cones(position_ws_from_depth(uv, depth), octahedral_decode(normals.xy),
                               octahedral_decode(normals.zw));
-    low_indirect = vec4(g.radiance, 1.0);
-    low_direction = g.direction;
+    raw_indirect = vec4(g.radiance, 1.0);
+    raw_direction = g.direction;
 }

@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Smoothing of a low-resolution gather, before it is interpolated."""
+
+from __future__ import annotations
+
+from ..facts import Facts
+from ..frame import Frame
+from ..graph import Pass, Planned, Texture
+from .gbuffer import gather_size
+
+LIGHT = "radiance a white Lambert surface would reflect, W/(m²·sr)"
+_DIRECTION = "Σ luminance × direction, and Σ luminance, of what arrives"
+
+
+def raw_gather(low: str) -> tuple[Texture, Texture]:
+    """What a low-resolution gather writes for ``BlockSmoothing(low)``."""
+    return (
+        Texture(f"{low}.raw", "raw_indirect", LIGHT, "rgba32f", gather_size, scratch=True),
+        Texture(f"{low}.raw_direction", "raw_direction", _DIRECTION, "rgba32f", gather_size, scratch=True),
+    )
+
+
+class BlockSmoothing(Pass):
+    """Neighbouring blocks of one surface share their directions: ``low``.raw becomes ``low``, for passes/interpolate.glsl."""
+
+    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "passes/smooth_blocks_frag.glsl"}}
+
+    def __init__(self, low: str, title: str, figure: str = "") -> None:
+        self.title, self.figure = title, figure
+        self.reads = (f"{low}.raw", f"{low}.raw_direction", "gbuffer.low_depth", "gbuffer.low_normal", "gbuffer.low_pixel")
+        self.writes = (
+            Texture(low, "low_indirect", LIGHT, "rgba32f", gather_size, scratch=True),
+            Texture(f"{low}.direction", "low_direction", _DIRECTION, "rgba32f", gather_size, scratch=True),
+        )  # fmt: skip
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return {"GATHER_SCALE": facts.settings.gather_scale}
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        frame.screen(planned, frame.program(planned))
