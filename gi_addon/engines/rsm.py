@@ -22,7 +22,7 @@ from ..passes.resolve import Resolve
 from ..passes.surface_points import SETS, SurfacePoints, points_per_subframe
 from ..passes.volumetric import MEDIUM_UNIFORMS, Volumetric, medium_defines, set_medium
 from ..passes.world_guide import WorldGuide
-from ..passes.world_rays import WorldRays, WorldRaysInterpolation
+from ..passes.world_rays import WorldRays
 from ..settings import Settings
 
 
@@ -49,7 +49,6 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         IndirectLighting(settings),
         Subsurface(),
         WorldRays(),
-        WorldRaysInterpolation(),
         DirectLighting(),
         GlossyReflections(),
         Refraction(),

@@ -4,9 +4,9 @@
 A control variate (J. Hammersley and D. Handscomb, "Monte Carlo Methods", 1964, §5.5). With D the light of the directions
 that have shadow maps, B the same directions' light if the cells were the scene, and A that of many more directions through
 the cells, D + A − B has D's expectation, because A and B have the same, and where maps and cells agree it has A's noise.
-The weight of A − B is 1: cells hide more than maps do (every cell that a surface touches is solid), so what they see is a
-part of what maps see. For a share b of directions that are open in the cells, out of d open in the maps, the best weight
-is then Cov(D, B)/Var(B) = (1 − d)/(1 − b), near 1 for openings that are a small part of the sky.
+The weight of A − B is 1: for shares d and b of directions that are open in the maps and in the cells, the cells' being a
+part of the maps' (every cell that a surface touches is solid), the best weight Cov(D, B)/Var(B) is (1 − d)/(1 − b), near 1
+for openings that are a small part of the sky.
 """
 
 from __future__ import annotations
@@ -17,42 +17,40 @@ from ..facts import Facts
 from ..frame import Frame
 from ..gl.structs import struct
 from ..gpu_types import LIGHT_WORLD
-from ..graph import Buffer, Optional, Pass, Planned, Texture
+from ..graph import Buffer, Optional, Pass, Planned, Texture, Uniform
 from ..sequence import sobol_2d
-from .gbuffer import _screen, gather_size
+from .gbuffer import _screen
 from .occupancy import CELL_UNIFORMS, set_cells
 from .volumetric import MEDIUM_UNIFORMS, medium_defines, set_medium
 
 # `direction_ws` towards the sky; `emission` is the irradiance that the direction stands for, W/m², negative for those of
-# shadow maps.
-WORLD_RAY = struct(("direction_ws", "f4", 3), ("_pad0", "f4"), ("emission", "f4", 3), ("_pad1", "f4"))
-_SEED = 13
+# shadow maps; the ray starts `shift` cells beside the point, within a square of one cell in the surface's plane.
+WORLD_RAY = struct(("direction_ws", "f4", 3), ("shift_x", "f4"), ("emission", "f4", 3), ("shift_y", "f4"))
+# Rays for each direction with a shadow map: their mean knows an edge within a cell, one ray would know it by whole cells.
+_SHIFTS = 8
+_DIRECTION_SEED, _SHIFT_SEED, _MAPPED_SHIFT_SEED = 13, 14, 15
 
 
 def ray_count(facts: Facts) -> int:
-    """Directions through the cells, those with shadow maps included."""
-    return facts.settings.world.rays + sum(s.kind == LIGHT_WORLD for s in facts.rig.sources)
-
-
-def _defines(facts: Facts) -> dict[str, int]:
-    return {"WORLD_RAYS": ray_count(facts), "GATHER_SCALE": facts.settings.gather_scale, **medium_defines(facts)}
+    """Rays per pixel and sub-frame."""
+    return facts.settings.world.rays + _SHIFTS * sum(s.kind == LIGHT_WORLD for s in facts.rig.sources)
 
 
 class WorldRays(Pass):
-    """The rays' light less that of the shadow maps' directions, at one pixel per block."""
+    """The rays' light less that of the shadow maps' directions."""
 
     title = "World Rays"
-    reads = ("occupancy", Optional("world.guide"), "gbuffer.low_depth", "gbuffer.low_normal", "gbuffer.low_pixel")
+    reads = ("occupancy", Optional("world.guide"), "gbuffer.depth", "gbuffer.normal")
     writes = (
-        Texture("world.low", "low_rays", "radiance that a white Lambert surface would reflect, W/(m²·sr); expectation 0",
-                "rgba32f", gather_size),
-        Buffer("world.rays", "world_rays", "directions of this sub-frame", "WorldRay", WORLD_RAY, ray_count),
+        Texture("world.difference", "world_difference", "radiance that a white Lambert surface would reflect, W/(m²·sr); "
+                "expectation 0", "rgba32f", _screen),
+        Buffer("world.rays", "world_rays", "directions of this sub-frame", "WorldRay", WORLD_RAY, ray_count, scratch=True),
     )  # fmt: skip
-    uniforms = (*CELL_UNIFORMS, *MEDIUM_UNIFORMS)
-    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "passes/world_rays_low_frag.glsl"}}
+    uniforms = (Uniform("ray_count", "int", "rays in the list"), *CELL_UNIFORMS, *MEDIUM_UNIFORMS)
+    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "passes/world_rays_frag.glsl"}}
 
     def defines(self, facts: Facts) -> dict[str, int]:
-        return _defines(facts)
+        return medium_defines(facts)
 
     def absent(self, facts: Facts) -> str | None:
         if not any(s.kind == LIGHT_WORLD for s in facts.rig.sources):
@@ -64,10 +62,12 @@ class WorldRays(Pass):
         return None if facts.settings.world.rays else "world.rays is 0"
 
     def run(self, frame: Frame, planned: Planned) -> None:
-        frame.upload("world.rays", self.directions(frame, planned.facts))
+        facts = planned.facts
+        frame.upload("world.rays", self.directions(frame, facts))
         program = frame.program(planned)
-        set_cells(frame, program, planned.facts)
-        set_medium(frame, program, planned.facts)
+        frame.set(program, ray_count=ray_count(facts))
+        set_cells(frame, program, facts)
+        set_medium(frame, program, facts)
         frame.screen(planned, program)
 
     @staticmethod
@@ -75,35 +75,14 @@ class WorldRays(Pass):
         """WORLD_RAY (N,): the sub-frame's share of one sequence, and the lights to take away."""
         rig, count = facts.rig, facts.settings.world.rays
         mapped = frame.light_sample(bounce=False).lights
-        mapped = mapped[mapped["kind"] == LIGHT_WORLD]
+        mapped = mapped[mapped["kind"] == LIGHT_WORLD].repeat(_SHIFTS)
         rays = np.zeros(count + len(mapped), WORLD_RAY)
+        index = frame.subframe * count + np.arange(count)
         world = rig.direct_world or rig.world
-        direction, weight, _ = world.sample(sobol_2d(frame.subframe * count + np.arange(count), _SEED))
+        direction, weight, _ = world.sample(sobol_2d(index, _DIRECTION_SEED))
         rays["direction_ws"][:count], rays["emission"][:count] = direction, weight / count
-        rays["direction_ws"][count:], rays["emission"][count:] = -mapped["axis_ws"], -mapped["emission"]
+        rays["direction_ws"][count:], rays["emission"][count:] = -mapped["axis_ws"], -mapped["emission"] / _SHIFTS
+        mapped_index = frame.subframe * len(mapped) + np.arange(len(mapped))
+        shift = np.concatenate([sobol_2d(index, _SHIFT_SEED), sobol_2d(mapped_index, _MAPPED_SHIFT_SEED)]) - 0.5
+        rays["shift_x"], rays["shift_y"] = shift[:, 0], shift[:, 1]
         return rays
-
-
-class WorldRaysInterpolation(Pass):
-    """The same at every pixel."""
-
-    title = "World Rays Interpolation"
-    reads = (
-        "world.low", "world.rays", "occupancy", "gbuffer.depth", "gbuffer.normal", "gbuffer.low_depth",
-        "gbuffer.low_normal", "gbuffer.low_pixel",
-    )  # fmt: skip
-    writes = (
-        Texture("world.difference", "world_difference", "radiance that a white Lambert surface would reflect, W/(m²·sr); "
-                "expectation 0", "rgba32f", _screen),
-    )  # fmt: skip
-    uniforms = (*CELL_UNIFORMS, *MEDIUM_UNIFORMS)
-    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "passes/world_rays_frag.glsl"}}
-
-    def defines(self, facts: Facts) -> dict[str, int]:
-        return _defines(facts)
-
-    def run(self, frame: Frame, planned: Planned) -> None:
-        program = frame.program(planned)
-        set_cells(frame, program, planned.facts)
-        set_medium(frame, program, planned.facts)
-        frame.screen(planned, program)

@@ -87,7 +87,7 @@ float cells_distance(vec3 from_ws, vec3 direction)
     return hit < 0.0 ? -1.0 : hit * cell_size;
 }
 
-// Whether a ray along the unit `direction` leaves the grid without meeting a surface's cell after a free one.
+// Whether a ray along the unit `direction` leaves the grid through free cells only; one that starts in a surface's does not.
 bool cells_open(vec3 from_ws, vec3 direction)
 {
     vec3 start = (from_ws - cell_origin_ws) / cell_size;
@@ -97,20 +97,18 @@ bool cells_open(vec3 from_ws, vec3 direction)
     vec2 span = cells_span(start, inverse);
     ivec3 last = textureSize(occupancy, 0) - 1;
     float t = span.x + 1e-3;
-    bool free_before = span.x > 0.0;
-    bool blocked = false;
+    bool open = true;
     for (int i = 0; i < CELL_STEPS; ++i) {
-        if (t < span.y && !blocked) {
+        if (t < span.y && open) {
             vec3 p = start + direction * t;
             float level = floor(texelFetch(occupancy, clamp(ivec3(floor(p)), ivec3(0), last), 0).r * 255.0 + 0.5);
-            blocked = level < 0.5 && free_before;
-            free_before = free_before || level > 0.5;
+            open = level > 0.5;
             t += max(cell_exit(p, inverse, forward, exp2(max(level - 1.0, 0.0))), 0.0) + 1e-3;
         } else {
             break;
         }
     }
-    return !blocked && t >= span.y;
+    return open && t >= span.y;
 }
 
 // The next run of occupied cells along a ray in cells (`direction` a unit vector without zeros) that free cells come before,
