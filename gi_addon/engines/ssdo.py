@@ -23,8 +23,11 @@ from ..passes.brdf_tables import BRDFTables
 from ..passes.direct_lighting import DirectLighting
 from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint, _screen, gather_size
 from ..passes.lights import LightList, ShadowMaps
+from ..passes.occupancy import Occupancy
 from ..passes.resolve import Resolve
 from ..passes.volumetric import Volumetric
+from ..passes.world_guide import WorldGuide
+from ..passes.world_rays import WorldRays
 from ..settings import Settings
 
 
@@ -42,6 +45,8 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         ]  # fmt: skip
     return [
         BRDFTables(),
+        Occupancy(),
+        WorldGuide(),
         LightList(),
         ShadowMaps(),
         GBuffer(),
@@ -53,6 +58,7 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         InterpolatedIndirect("gbuffer.emission", "screen.low"),
         Smoothing("gbuffer.emission", "screen.low"),
         IndirectLighting("gbuffer.emission", "screen.low", "screen.light"),
+        WorldRays(),
         DirectLighting() if settings.ssdo.shadows == "MAPS" or not settings.use_shadows else ScreenShadowLighting(),
         *bounces,
         ShadedScreen(),
