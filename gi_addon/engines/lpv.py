@@ -26,9 +26,9 @@ from ..passes.lights import LightList, RSMGeneration, ShadowMaps
 from ..passes.occupancy import Occupancy
 from ..passes.resolve import Resolve
 from ..passes.volumetric import MEDIUM_UNIFORMS, Volumetric, air, medium_defines, set_medium
-from ..scene import SHADOW
 from ..passes.world_guide import WorldGuide
 from ..passes.world_rays import WorldRays
+from ..scene import SHADOW
 from ..settings import Settings
 from .rsm import Subsurface
 
