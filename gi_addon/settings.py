@@ -112,6 +112,11 @@ class WorldSettings:
         True, "Aim at Openings", "Draw the directions of direct light mostly from the parts of the sky that visible "
         "surfaces see, from four sub-frames on",
     )  # fmt: skip
+    rays: int = _setting(
+        32, "Rays", "Further directions per sub-frame whose shadows the grid of cells tells, to smooth diffuse light between "
+        "those with maps; their mean adds no light. 0 switches them off", low=0, high=1024,
+        higher="smoother sky light through openings", lower="faster",
+    )  # fmt: skip
 
 
 @dataclass

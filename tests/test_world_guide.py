@@ -37,25 +37,31 @@ def floor_irradiance(points: np.ndarray) -> np.ndarray:
     return (RADIANCE * z * z / d2**2).sum(axis=1) * (x1 - x0) * (y1 - y0) / n**2
 
 
+def floor(camera, size) -> tuple[np.ndarray, np.ndarray]:
+    """(mask (H, W), points (N, 2)): the pixels whose ray meets z = 0 away from the walls, and where."""
+    width, height = size
+    v, u = np.meshgrid((np.arange(height) + 0.5) / height * 2 - 1, (np.arange(width) + 0.5) / width * 2 - 1, indexing="ij")
+    inverse = np.linalg.inv(np.asarray(camera.clip_from_view, "f8"))
+    ray = np.stack([u, v, np.ones_like(u), np.ones_like(u)], -1) @ inverse.T
+    world_from_view = np.asarray(camera.world_from_view, "f8")
+    ray = (ray[..., :3] / ray[..., 3:]) @ world_from_view[:3, :3].T
+    eye = world_from_view[:3, 3]
+    hit = eye + ray * (-eye[2] / np.where(ray[..., 2] < 0, ray[..., 2], np.nan))[..., None]
+    mask = (np.abs(hit[..., :2]) < 1.8).all(axis=-1)
+    return mask, hit[mask][:, :2]
+
+
 def test_a_room_is_lit_through_its_window_with_less_noise_and_the_same_light(gl):
     errors = {}
     for aimed in (True, False):
         result = make(room(), "Diffuse Direct", "Depth", "Normal", samples=64, world__aimed=aimed, resolution=(48, 27))
         direct = result.passes["Diffuse Direct"][..., 0]
-        camera = room().camera
-        # Where a pixel's ray meets z = 0.
-        v, u = np.meshgrid((np.arange(27) + 0.5) / 27 * 2 - 1, (np.arange(48) + 0.5) / 48 * 2 - 1, indexing="ij")
-        inverse = np.linalg.inv(np.asarray(camera.clip_from_view, "f8"))
-        ray = np.stack([u, v, np.ones_like(u), np.ones_like(u)], -1) @ inverse.T
-        ray = (ray[..., :3] / ray[..., 3:]) @ np.asarray(camera.world_from_view, "f8")[:3, :3].T
-        eye = np.asarray(camera.world_from_view, "f8")[:3, 3]
-        hit = eye + ray * (-eye[2] / np.where(ray[..., 2] < 0, ray[..., 2], np.nan))[..., None]
-        floor = (np.abs(hit[..., :2]) < 1.8).all(axis=-1)
-        assert floor.sum() > 300
-        expected = floor_irradiance(hit[floor][:, :2]) / np.pi
-        errors[aimed] = np.sqrt(((direct[floor] - expected) ** 2).mean()) / expected.mean()
+        mask, points = floor(room().camera, (48, 27))
+        assert mask.sum() > 300
+        expected = floor_irradiance(points) / np.pi
+        errors[aimed] = np.sqrt(((direct[mask] - expected) ** 2).mean()) / expected.mean()
         if aimed:
-            assert abs(direct[floor].mean() / expected.mean() - 1.0) < 0.05
+            assert abs(direct[mask].mean() / expected.mean() - 1.0) < 0.05
     assert errors[True] < 0.6 * errors[False], errors
 
 
@@ -74,3 +80,40 @@ def test_a_guide_that_sees_nothing_changes_nothing():
     world = WorldMap(np.ones((16, 32, 3)))
     assert world.guided(np.zeros((12, 24))) is world
     assert WorldMap(np.zeros((16, 32, 3))).guided(np.ones((12, 24))).black
+
+
+def test_rays_through_the_cells_smooth_the_light_and_keep_its_mean(gl):
+    size, scene = (48, 27), room()
+    mask, points = floor(scene.camera, size)
+    expected = floor_irradiance(points) / np.pi
+    for technique in ("RSM", "LPV"):
+        errors = {}
+        for rays in (0, 32):
+            result = make(scene, "Diffuse Direct", technique=technique, samples=8, world__rays=rays, resolution=size)
+            direct = result.passes["Diffuse Direct"][..., 0][mask]
+            errors[rays] = ((direct - expected) ** 2).mean() / expected.mean() ** 2
+        assert errors[32] < 0.6 * errors[0], (technique, errors)
+    many = make(scene, "Diffuse Direct", samples=64, world__rays=32, resolution=size).passes["Diffuse Direct"][..., 0][mask]
+    plain = make(scene, "Diffuse Direct", samples=64, world__rays=0, resolution=size).passes["Diffuse Direct"][..., 0][mask]
+    assert abs(many.mean() / expected.mean() - 1.0) < 0.03
+    # Pixel by pixel too: the rays shift no light from one place to another.
+    near = [np.sqrt(((p - expected) ** 2).mean()) / expected.mean() for p in (many, plain)]
+    assert near[0] < near[1], near
+
+
+def test_rays_through_cells_too_coarse_for_the_window_add_no_light(gl):
+    """Cells of 31 cm hide most of the window, so A and B are wrong; their difference still has mean zero."""
+    size, scene = (24, 14), room()
+    mask, points = floor(scene.camera, size)
+    result = make(scene, "Diffuse Direct", samples=256, world__rays=8, rsm__visibility_resolution=16, resolution=size)
+    expected = floor_irradiance(points) / np.pi
+    assert abs(result.passes["Diffuse Direct"][..., 0][mask].mean() / expected.mean() - 1.0) < 0.03
+
+
+def test_rays_are_absent_without_a_world_or_when_switched_off(gl):
+    off, dark = (
+        make(scene, "Diffuse Direct", samples=1, world__rays=rays, resolution=(16, 9)).plan.text()
+        for scene, rays in ((room(), 0), (scenes.cornell(), 32))
+    )
+    assert "World Rays — world.rays is 0" in off
+    assert "World Rays — the world gives no light" in dark

@@ -23,8 +23,11 @@ from ..passes.brdf_tables import BRDFTables
 from ..passes.direct_lighting import DirectLighting
 from ..passes.gbuffer import GBuffer, TranslucentBack, TranslucentLayer, TranslucentTint, _screen
 from ..passes.lights import LightList, RSMGeneration, ShadowMaps
+from ..passes.occupancy import Occupancy
 from ..passes.resolve import Resolve
 from ..passes.volumetric import MEDIUM_UNIFORMS, Volumetric, air, medium_defines, set_medium
+from ..passes.world_guide import WorldGuide
+from ..passes.world_rays import WorldRays
 from ..scene import SHADOW
 from ..settings import Settings
 from .rsm import Subsurface
@@ -49,6 +52,8 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
     injection = RadianceInjection()
     return [
         BRDFTables(),
+        Occupancy(),
+        WorldGuide(),
         LightList(),
         ShadowMaps(),
         RSMGeneration(),
@@ -65,6 +70,7 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         GlossyLighting(),
         Refraction(),
         Subsurface(),
+        WorldRays(),
         DirectLighting(),
         Volumetric(),
         Resolve(layers),

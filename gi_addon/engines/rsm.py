@@ -22,6 +22,7 @@ from ..passes.resolve import Resolve
 from ..passes.surface_points import SETS, SurfacePoints, points_per_subframe
 from ..passes.volumetric import MEDIUM_UNIFORMS, Volumetric, medium_defines, set_medium
 from ..passes.world_guide import WorldGuide
+from ..passes.world_rays import WorldRays
 from ..settings import Settings
 
 
@@ -47,6 +48,7 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         InterpolatedIndirect(settings),
         IndirectLighting(settings),
         Subsurface(),
+        WorldRays(),
         DirectLighting(),
         GlossyReflections(),
         Refraction(),

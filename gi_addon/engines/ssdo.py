@@ -23,9 +23,12 @@ from ..passes.brdf_tables import BRDFTables
 from ..passes.direct_lighting import DirectLighting
 from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint, _screen
 from ..passes.lights import LightList, ShadowMaps
+from ..passes.occupancy import Occupancy
 from ..passes.resolve import Resolve
 from ..passes.smoothing import LIGHT, BlockSmoothing, raw_gather
 from ..passes.volumetric import Volumetric
+from ..passes.world_guide import WorldGuide
+from ..passes.world_rays import WorldRays
 from ..settings import Settings
 
 
@@ -43,6 +46,8 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         ]  # fmt: skip
     return [
         BRDFTables(),
+        Occupancy(),
+        WorldGuide(),
         LightList(),
         ShadowMaps(),
         GBuffer(),
@@ -54,6 +59,7 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         InterpolatedIndirect("gbuffer.emission", "screen.low"),
         _smoothing("gbuffer.emission", "screen.low"),
         IndirectLighting("gbuffer.emission", "screen.low", "screen.light"),
+        WorldRays(),
         DirectLighting() if settings.ssdo.shadows == "MAPS" or not settings.use_shadows else ScreenShadowLighting(),
         *bounces,
         ShadedScreen(),

@@ -21,6 +21,7 @@ from ..passes.smoothing import LIGHT, BlockSmoothing, raw_gather
 from ..passes.volumetric import MEDIUM_UNIFORMS, Volumetric, medium_defines, set_medium
 from ..passes.voxels import GRID_UNIFORMS, VoxelGrid, Voxelisation, voxel_grid
 from ..passes.world_guide import WorldGuide
+from ..passes.world_rays import WorldRays
 from ..settings import Settings
 from .rsm import Subsurface
 
@@ -51,6 +52,7 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         GlossyCones(),
         *([ShadowCones()] if settings.vct.shadow_cones else []),
         Subsurface(),
+        WorldRays(),
         DirectLighting(),
         RefractionCones(),
         VoxelVolumetric(),

@@ -20,7 +20,7 @@ class DirectLighting(Pass):
         Optional("gbuffer.specular", ("direct.glossy",)), Optional("gbuffer.lobe", ("direct.glossy",)),
         Optional("brdf.energy", ("direct.glossy",)), Optional("brdf.average", ("direct.glossy",)),
         Optional("direct.subsurface", ("direct.diffuse",)),
-        Optional("screen.light", ("direct.diffuse",)),
+        Optional("screen.light", ("direct.diffuse",)), Optional("world.difference", ("direct.diffuse",)),
     )  # fmt: skip
     writes = (
         Texture("direct.diffuse", "direct_diffuse", "radiance a white Lambert surface would reflect, W/(m²·sr)",

@@ -97,6 +97,30 @@ vec3 cells_first(vec3 from_ws, vec3 direction, float after)
 // Distance (m) along the unit `direction` to the first cell with a surface in it after a free one; −1 if there is none.
 float cells_distance(vec3 from_ws, vec3 direction) { return cells_first(from_ws, direction, 0.0).y; }
 
+// Whether a ray along the unit `direction` leaves the grid through free cells only; one that starts in a surface's does not.
+bool cells_open(vec3 from_ws, vec3 direction)
+{
+    vec3 start = (from_ws - cell_origin_ws) / cell_size;
+    direction = mix(direction, vec3(1e-6), lessThan(abs(direction), vec3(1e-6)));
+    vec3 inverse = 1.0 / direction;
+    vec3 forward = step(0.0, direction);
+    vec2 span = cells_span(start, inverse);
+    ivec3 last = textureSize(occupancy, 0) - 1;
+    float t = span.x + 1e-3;
+    bool open = true;
+    for (int i = 0; i < CELL_STEPS; ++i) {
+        if (t < span.y && open) {
+            vec3 p = start + direction * t;
+            float level = floor(texelFetch(occupancy, clamp(ivec3(floor(p)), ivec3(0), last), 0).r * 255.0 + 0.5);
+            open = level > 0.5;
+            t += max(cell_exit(p, inverse, forward, exp2(max(level - 1.0, 0.0))), 0.0) + 1e-3;
+        } else {
+            break;
+        }
+    }
+    return open && t >= span.y;
+}
+
 // The next run of occupied cells along a ray in cells (`direction` a unit vector without zeros) that free cells come before,
 // from `t` on; `t` ends behind it. `far` in cells. False where there is none.
 bool cells_next_run(vec3 start, vec3 direction, float far, inout float t, inout bool free_before, out vec2 run)

@@ -95,6 +95,9 @@ void main()
 #endif
         }
         diffuse = lit_light * INV_PI;
+#if HAS_WORLD_DIFFERENCE
+        diffuse += texelFetch(world_difference, pixel, 0).rgb;
+#endif
 #if HAS_DIRECT_SUBSURFACE
         vec4 below = texelFetch(direct_subsurface, pixel, 0);
         diffuse = mix(diffuse, below.rgb, below.a);
