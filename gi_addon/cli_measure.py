@@ -137,7 +137,9 @@ def bench_command(scene, techniques, scale, frames, rows, limit, output) -> None
         console.print(f"wrote {path}")
 
 
-def report_command(scenes, techniques, sweep, peers, effects, references_folder, reference_samples, output, options) -> None:
+def report_command(
+    scenes, techniques, sweep, peers, effects, references_folder, reference_samples, visits, output, options
+) -> None:
     """Measure scenes with all candidates and write the report. ``options`` are the scene options of the command line."""
     from .cli import _blender, _sync
     from .compare import report, study
@@ -193,6 +195,7 @@ def report_command(scenes, techniques, sweep, peers, effects, references_folder,
                     cache=output / "runs",
                     peer=run_peer,
                     peer_version=host_peers.VERSION,
+                    visits=visits,
                     progress=lambda text, label=label: console.print(f"{label}: {text}", style="dim", highlight=False),
                 )
         record = study.scene_record(label, key, size, samples, runs, references, plain.triangle_count())
