@@ -60,7 +60,7 @@ KNOWN: dict[tuple[str, str], str] = {
     **dict.fromkeys((("SSDO", "8"), ("SSDO", "13"), ("VCT", "8"), ("VCT", "9")), _GATHER),
     **dict.fromkeys((("VCT", "6"),), _NOISE),
     ("SSDO", "6"): "noise that moves with the camera: .040; 16 sub-frames with gather_scale 1 leave .015",
-    ("SSDO", "7"): "22 of 24 steps change nothing and two change all: steps of the object are smaller than a pixel shows",
+    ("SSDO", "7"): "what it gathers is the screen: the plate moves by whole pixels, so 22 of 24 steps change nothing",
     ("SSDO", "10"): "rays differ from pixel to pixel: 16 sub-frames leave 6.7 % of noise, 64 leave 3.1 %",
     ("LPV", "1"): "a lamp 0.2 R from the wall: g = 0.85 in a grid of 32 cells; lamps further off pass",
     ("LPV", "13"): "small bright patches show as rays of the ordinates: the error grows by 48 % from one grid to the next finer",
