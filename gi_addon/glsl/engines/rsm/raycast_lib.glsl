@@ -20,6 +20,10 @@ const int RAY_HALVINGS = 4;
 // Virtual lights that light a point which the picture does not show: an even share of them, another one for every ray.
 const int RAY_VPLS = 4;
 const float NO_SURFACE = 1e30;
+// A surface that faces as the ray's own does (within 45°) and is not half a cell above it is that one: half of what its
+// place is known to.
+const float OWN_FACING = 0.707;
+const float OWN_HEIGHT = 0.5;
 
 // How far behind a point (along the map's axis) the surface is that light `light` sees in its direction; negative: the
 // point is behind it. `known` is false outside the light's maps.
@@ -139,7 +143,9 @@ vec3 rsm_ray(vec3 origin_ws, vec3 direction, vec3 ng, float u, out bool hit, out
             bool known;
             float gap = rsm_gap(light, origin_ws + direction * b, known, index, texel);
             RsmTexel s = rsm_texel(index, texel);
-            if (known && gap > -cell_size && s.area > 0.0 && dot(s.normal_ws, direction) < 0.0) {
+            // A light below a sheet without thickness sees its underside, which the ray has just left.
+            bool left = abs(dot(s.normal_ws, ng)) > OWN_FACING && b * dot(direction, ng) < OWN_HEIGHT * cell_size;
+            if (known && gap > -cell_size && s.area > 0.0 && dot(s.normal_ws, direction) < 0.0 && !left) {
                 radiance += s.flux * (INV_PI / s.area);
                 if (b < distance) {
                     distance = b;
