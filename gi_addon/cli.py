@@ -183,13 +183,20 @@ def inspect_command(
 @click.argument("scenes", nargs=-1, type=click.Path(path_type=Path))
 @_scene_options
 @click.option("--techniques", help="Techniques separated by commas, or 'all'.")
-@click.option("--sweep", type=click.Choice(("none", "quick", "full")), help="How many settings of each technique to try.")
+@click.option("--sweep", type=click.Choice(("none", "samples", "quick", "full")),
+              help="How many settings of each technique to try.")
 @click.option("--peers", default="", help="Rivals in the same run: cycles, eevee, or both separated by a comma.")
 @click.option("--effects", is_flag=True, help="The paper's Table 1 with numbers, on scenes made for each effect.")
+@click.option("--references", "references_folder", type=click.Path(path_type=Path, exists=True, file_okay=False),
+              help="Folder of ready references, SCENE.npz; scenes that it lacks are rendered with Cycles.")
 @click.option("--reference-samples", default=256, show_default=True, help="Cycles samples per half.")
+@click.option("--visits", type=click.IntRange(1, 2), default=2, show_default=True,
+              help="1 measures each candidate once; 2 goes there and back, so that a machine's drift shows.")
 @click.option("-o", "--output", type=click.Path(path_type=Path), default=Path("quartet-compare"), show_default=True,
               help="Folder for the report, sheets and results.json.")
-def compare_command(scenes, techniques, sweep, peers, effects, reference_samples, output, **options) -> None:
+def compare_command(
+    scenes, techniques, sweep, peers, effects, references_folder, reference_samples, visits, output, **options
+) -> None:
     """Render SCENES with Quartet and with unbiased Cycles (R1 and R∞, cached) and state the error per pass.
 
     SCENES are files, or builtin:NAME. One scene alone gives a sheet; more scenes, --techniques, --sweep or --peers give
@@ -197,8 +204,10 @@ def compare_command(scenes, techniques, sweep, peers, effects, reference_samples
     """
     if not scenes and not effects:
         raise click.UsageError("name a scene file, builtin:NAME, or --effects")
-    if effects or len(scenes) > 1 or techniques or sweep or peers:
-        report_command(scenes, techniques, sweep or "none", peers, effects, reference_samples, output, options)
+    if effects or len(scenes) > 1 or techniques or sweep or peers or references_folder:
+        report_command(
+            scenes, techniques, sweep or "none", peers, effects, references_folder, reference_samples, visits, output, options
+        )
     else:
         _sheet(scenes[0], reference_samples=reference_samples, output=output, **options)
 

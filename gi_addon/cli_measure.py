@@ -137,11 +137,13 @@ def bench_command(scene, techniques, scale, frames, rows, limit, output) -> None
         console.print(f"wrote {path}")
 
 
-def report_command(scenes, techniques, sweep, peers, effects, reference_samples, output, options) -> None:
+def report_command(
+    scenes, techniques, sweep, peers, effects, references_folder, reference_samples, visits, output, options
+) -> None:
     """Measure scenes with all candidates and write the report. ``options`` are the scene options of the command line."""
     from .cli import _blender, _sync
     from .compare import report, study
-    from .compare.references import BOUNCES, reference
+    from .compare.references import BOUNCES, ready, reference
     from .compare.sweeps import peer_sweep, technique_sweep
     from .gl import driver
 
@@ -170,7 +172,12 @@ def report_command(scenes, techniques, sweep, peers, effects, reference_samples,
                     return {n: p[..., :3] for n, p in cycles.render_passes(bscene, study.COMPARED).items()}
 
             console.print(f"{label}: references")
-            references = {k: reference(k, key, size, reference_samples, study.COMPARED, run_cycles) for k in BOUNCES}
+            try:
+                found = ready(references_folder / f"{scene.stem}.npz", size, study.COMPARED) if references_folder else None
+            except ValueError as error:
+                raise click.UsageError(str(error)) from error
+            samples = None if found else reference_samples
+            references = found or {k: reference(k, key, size, samples, study.COMPARED, run_cycles) for k in BOUNCES}
 
             def run_peer(candidate, passes, bscene=bscene):
                 if candidate.method == "EEVEE":
@@ -188,9 +195,10 @@ def report_command(scenes, techniques, sweep, peers, effects, reference_samples,
                     cache=output / "runs",
                     peer=run_peer,
                     peer_version=host_peers.VERSION,
+                    visits=visits,
                     progress=lambda text, label=label: console.print(f"{label}: {text}", style="dim", highlight=False),
                 )
-        record = study.scene_record(label, key, size, reference_samples, runs, references, plain.triangle_count())
+        record = study.scene_record(label, key, size, samples, runs, references, plain.triangle_count())
         measured.append(report.Measured(record, runs, references))
     head = {"version": study.source_version(), "driver": driver(), "date": datetime.date.today().isoformat(), "sweep": sweep}
     extra = ""

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from gi_addon.compare import certificate, charts, effects, page, report, scenes, study, sweeps
+from gi_addon.compare import certificate, charts, effects, page, references, report, scenes, study, sweeps
 from gi_addon.compare.metrics import score
 from gi_addon.compare.references import Halves
 from gi_addon.compare.studio import Studio, settings_for, without_pass
@@ -73,14 +73,28 @@ def test_the_heat_map_is_dark_where_the_error_is_small():
     assert colors[0] == colors[1] < colors[2] < colors[3]
 
 
+def test_ready_references_are_averaged_in_blocks(tmp_path):
+    """Row 0 of the file is the top; of the picture, the bottom. A size that is no whole share is refused."""
+    rows = np.arange(4.0)[:, None, None] + np.zeros((4, 8, 3))
+    keys = {f"{kind}.{half}.DiffInd": rows + (half == "B") for kind in ("R1", "Rinf") for half in "AB"}
+    np.savez(tmp_path / "room.npz", **keys)
+    found = references.ready(tmp_path / "room.npz", (4, 2), ("Combined", "Diffuse Indirect"))
+    assert set(found) == {"R1", "Rinf"} and set(found["R1"].a) == {"Diffuse Indirect"}
+    assert found["R1"].a["Diffuse Indirect"][:, 0, 0].tolist() == [2.5, 0.5]
+    assert found["R1"].mean("Diffuse Indirect").shape == (2, 4, 3) and found["Rinf"].b["Diffuse Indirect"][0, 0, 0] == 3.5
+    assert references.ready(tmp_path / "hall.npz", (4, 2), ("Combined",)) is None
+    with pytest.raises(ValueError, match="no whole share"):
+        references.ready(tmp_path / "room.npz", (3, 2), ("Diffuse Indirect",))
+
+
 # --- sweeps and resumption ------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("technique", sorted(TECHNIQUES))
-@pytest.mark.parametrize("sweep", ["none", "quick", "full"])
+@pytest.mark.parametrize("sweep", ["none", "samples", "quick", "full"])
 def test_every_candidate_of_a_sweep_can_be_set(technique, sweep):
     found = technique_sweep(technique, sweep)
-    assert len(found) == len(set(found)) >= {"none": 1, "quick": 3, "full": 7}[sweep]
+    assert len(found) == len(set(found)) >= {"none": 1, "samples": 2, "quick": 3, "full": 7}[sweep]
     for candidate in found:
         settings = candidate.settings(Settings())
         assert settings.technique == technique and all(settings.get(k) == v for k, v in candidate.options)

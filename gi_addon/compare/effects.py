@@ -134,7 +134,7 @@ def html(cells: list[Cell]) -> str:
                 f"<span class=quiet>paper: {esc(c.paper)}</span><br>"
                 f"relMSE {number(c.score.rel_mse)}, gain {number(c.score.gain)}<br>off {number(c.off)}, constant "
                 f"{number(c.score.constant)}<br>"
-                f'<img src="{data_uri(c.image, scale=scale)}" width=110 alt="{technique} {effect}"> '
+                f'<img src="{data_uri(c.image, scale=scale)}" width=110 alt="{technique} {effect}"><br>'
                 f'<img src="{data_uri(c.reference, scale=scale)}" width=110 alt="Cycles {effect}"></td>'
             )
         rows.append("".join(line) + "</tr>")
@@ -144,7 +144,7 @@ def html(cells: list[Cell]) -> str:
     )
     return (
         "<h2 id=effects>Table 1 with numbers</h2>"
-        f"<p>Left Quartet ({SAMPLES} sub-frames, defaults), right Cycles. Yes: relMSE ≤ {ERROR_LIMIT:g} and gain within "
+        f"<p>Above Quartet ({SAMPLES} sub-frames, defaults), below Cycles. Yes: relMSE ≤ {ERROR_LIMIT:g} and gain within "
         f"{100 * GAIN_LIMIT:g} %. Partially: below the best constant and below the effect switched off. No: otherwise.</p>"
         f"<div class=scroll><table><thead><tr><th></th>{head}</tr></thead><tbody>{''.join(rows)}</tbody></table></div>"
         f"<ul>{how}</ul>"

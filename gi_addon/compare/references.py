@@ -17,6 +17,12 @@ import numpy as np
 
 from . import exr
 
+# Passes by their names in a ready reference's file.
+READY_KEYS = {
+    "Combined": "Combined", "Diffuse Direct": "DiffDir", "Diffuse Indirect": "DiffInd", "Diffuse Color": "DiffCol",
+    "Glossy Direct": "GlossDir", "Glossy Indirect": "GlossInd", "Glossy Color": "GlossCol", "Ambient Occlusion": "AO",
+    "Emission": "Emit", "Environment": "Env",
+}  # fmt: skip
 BOUNCES = {"R1": 1, "Rinf": 32}
 SEEDS = {"A": 1, "B": 2}
 _FORMAT = 1  # raised when what a cached file means changes
@@ -71,6 +77,36 @@ def reference(
             part.replace(path)
         halves.append({name: data[name] for name in passes})
     return Halves(*halves)
+
+
+def ready(path: Path, resolution: tuple[int, int], passes: Iterable[str]) -> dict[str, Halves] | None:
+    """References rendered elsewhere, R1 and Rinf, from an archive of arrays ``R1.A.DiffInd`` … (H, W, 3), row 0 at the top.
+
+    Blocks of pixels are averaged where the archive's picture is a whole multiple of ``resolution``: of a box filter of one
+    pixel that is the smaller picture's box filter, no approximation. None if there is no such file. Raises ValueError for
+    another size.
+    """
+    if not path.is_file():
+        return None
+    width, height = resolution
+
+    def shrunk(data: np.ndarray) -> np.ndarray:
+        rows, columns = data.shape[:2]
+        if rows % height or columns % width or rows * width != columns * height:
+            raise ValueError(f"{path.name} is {columns} x {rows}: {width} x {height} is no whole share of that")
+        blocks = data[::-1].astype("f4").reshape(height, rows // height, width, columns // width, -1)
+        return blocks.mean(axis=(1, 3), dtype="f8").astype("f4")
+
+    with np.load(path, allow_pickle=False) as data:
+        return {
+            kind: Halves(
+                *(
+                    {n: shrunk(data[key]) for n in passes if (key := f"{kind}.{half}.{READY_KEYS.get(n)}") in data.files}
+                    for half in SEEDS
+                )
+            )
+            for kind in BOUNCES
+        }
 
 
 def _read(path: Path, passes: tuple[str, ...]) -> dict[str, np.ndarray] | None:

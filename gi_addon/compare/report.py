@@ -148,10 +148,12 @@ def _scene_html(index: int, scene: Measured, drawn: dict[str, object]) -> tuple[
     record = scene.record
     stem = Path(record["scene"]).stem.replace("builtin:", "")
     wall, pictures = _wall(index, scene)
+    samples = record["reference_samples"]
+    made = f"with {samples} samples each" if samples else "rendered elsewhere"
     parts = [
         f'<h2 id="s{index}">{esc(record["scene"])}</h2>',
         f"<p class=quiet>{record['size'][0]} × {record['size'][1]} pixels, {record['triangles']} triangles; Cycles references of "
-        f"two halves with {record['reference_samples']} samples each.</p>",
+        f"two halves {made}.</p>",
         "<ul>" + "".join(f"<li>{esc(line)}</li>" for line in verdict_lines(record)) + "</ul>",
         wall,
         "<h3>Speed against accuracy</h3>",

@@ -190,16 +190,25 @@ def flux(suite: Suite) -> Finding:
     if not suite.traits.volume:
         return not_applicable("nothing is propagated")
     out = Finding()
-    # Without a number of iterations light crosses the whole grid: then its cells are the steps.
-    path = path if has_setting(path) else suite.traits.grid
-    counts = (8, 16, 32, 64) if suite.full else (16, 32)
+    # From corner to corner are as many cells as the grid has along three sides, with one of padding at each end: light of
+    # fewer iterations has not arrived everywhere. Without a number of iterations light crosses the whole grid: then its
+    # cells are the steps.
+    if has_setting(path):
+        cells = 32 if suite.full else 12  # iterations one by one are the slow way
+        grid = {suite.traits.grid.replace(".", "__"): cells}
+        across = 3 * (cells + 2)
+        counts = (8, 16, 32, 64, across, 2 * across) if suite.full else (16, across, 2 * across)
+    else:
+        path, across, grid = suite.traits.grid, 16, {}
+        counts = (8, 16, 32, 64) if suite.full else (16, 32)
     scene = scenes.integrating_sphere(albedo=0.5, power=100.0)
     exact = 0.5 * 100.0 / (4 * np.pi) / np.pi
     name = path.replace(".", "__")
-    gains = [float(_gray(suite.indirect(scene, samples=1, use_ao=False, **{name: n})).mean()) / exact for n in counts]
-    settled = [g for n, g in zip(counts, gains, strict=True) if n >= 16]
-    out.quantities = [within(f"Φ(N)/Φ(16), N = {path} ≥ 16", v / settled[0], 0.99, 1.01) for v in settled[1:]]
-    out.quantities.append(at_most("largest Φ_N over the exact one", max(gains), 1.01))
+    gains = [float(_gray(suite.indirect(scene, samples=1, use_ao=False, **{**grid, name: n})).mean()) / exact for n in counts]
+    settled = [g for n, g in zip(counts, gains, strict=True) if n >= across]
+    out.quantities = [within(f"Φ(N)/Φ({across}), N = {path} > {across}", v / settled[0], 0.99, 1.01) for v in settled[1:]]
+    out.quantities.append(at_most(f"largest Φ_N/Φ({across})", max(gains) / settled[0], 1.01))
+    out.quantities.append(reported("Φ over the exact one", settled[0]))  # test 1 judges it
     high = int(next(m.high for p, _, m in walk() if p == "bounces"))
     if high >= 2:
         means = [

@@ -137,10 +137,11 @@ def measure(
     peer: PeerRender | None = None,
     peer_version: str = "",
     repeats: int = 2,
+    visits: int = 2,
     progress: Callable[[str], None] = lambda text: None,
 ) -> list[Run]:
-    """Every candidate, from the cache where it is whole. They are visited there and back (A B … B A); each visit is saved
-    as it ends. A candidate that fails is left out, and said."""
+    """Every candidate, from the cache where it is whole. They are visited there and back (A B … B A), or only there
+    with ``visits`` 1; each visit is saved as it ends. A candidate that fails is left out, and said."""
     runs: dict[Candidate, tuple[Path, Run]] = {}
     for candidate in candidates:
         settings = None if candidate.peer else candidate.settings(base)
@@ -148,7 +149,7 @@ def measure(
         path = cache / f"{run_key(scene_key, size, candidate, settings, driver, version)}.npz"
         runs[candidate] = (path, load_run(path, candidate) or Run(candidate, {}))
     with Studio() as studio:
-        for number, order in ((1, list(runs)), (2, list(reversed(runs)))):
+        for number, order in ((1, list(runs)), (2, list(reversed(runs))))[:visits]:
             for candidate in order:
                 if candidate not in runs:
                     continue

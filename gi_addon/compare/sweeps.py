@@ -16,9 +16,9 @@ AXES: dict[str, dict[str, tuple]] = {
     "VCT": {"vct.resolution": (32, 64, 128), "vct.cones": (6, 16), "bounces": (1, 3)},
     "SSDO": {"ssdo.samples": (64, 256), "ssdo.integrator": ("BITMASK", "RAYS"), "gather_scale": (4, 1), "bounces": (1, 3)},
 }
-SUBFRAMES = {"none": (), "quick": (1, 4, 16), "full": (1, 2, 4, 8, 16, 32, 64)}
-CYCLES_SAMPLES = {"none": (1, 16), "quick": (1, 4, 16), "full": (1, 2, 4, 8, 16, 32, 64)}
-EEVEE_SAMPLES = {"none": (16,), "quick": (1, 16), "full": (1, 4, 16, 64)}
+SUBFRAMES = {"none": (), "samples": (1, 4), "quick": (1, 4, 16), "full": (1, 2, 4, 8, 16, 32, 64)}
+CYCLES_SAMPLES = {"none": (1, 16), "samples": (1, 4, 16), "quick": (1, 4, 16), "full": (1, 2, 4, 8, 16, 32, 64)}
+EEVEE_SAMPLES = {"none": (16,), "samples": (1, 16), "quick": (1, 16), "full": (1, 4, 16, 64)}
 
 
 @dataclass(frozen=True)
@@ -53,8 +53,8 @@ def _candidate(method: str, options: dict) -> Candidate:
 
 
 def technique_sweep(technique: str, sweep: str) -> list[Candidate]:
-    """``none``: the scene's own settings; ``quick``: sub-frames, and each axis alone at 4 sub-frames; ``full``: all
-    combinations of the axes at every number of sub-frames."""
+    """``none``: the scene's own settings; ``samples``: sub-frames; ``quick``: those, and each axis alone at 4 sub-frames;
+    ``full``: all combinations of the axes at every number of sub-frames."""
     if sweep == "none":
         return [Candidate(technique, ())]
     subframes = SUBFRAMES[sweep]
@@ -69,7 +69,7 @@ def technique_sweep(technique: str, sweep: str) -> list[Candidate]:
     if sweep == "quick":
         for name, values in axes.items():
             found += [_candidate(technique, {"samples": 4, name: v}) for v in values if v != default.get(name)]
-    else:
+    elif sweep == "full":
         for n, *values in itertools.product(subframes, *axes.values()):
             changed = {k: v for k, v in zip(axes, values, strict=True) if v != default.get(k)}
             found.append(_candidate(technique, {"samples": n, **changed}))
