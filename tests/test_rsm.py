@@ -51,6 +51,25 @@ def test_two_patches_match_their_form_factor(gl, distance, size):
     assert image["Diffuse Indirect"][seen].mean() == pytest.approx(expected, rel=0.01)
 
 
+@pytest.mark.parametrize(("plate", "reach", "share"), [
+    (1.0, 100.0, 1.0 - rectangle_form_factor(0.5, 1.0)),  # all but the plate's form factor
+    (2.0, 100.0, 1.0 - rectangle_form_factor(1.0, 1.0)),
+    (8.0, 2.0, 0.25),  # an endless plate at 1 m: directions with cosθ < 1 m / reach don't reach it, (1/2)² of all
+    (8.0, 0.9, 1.0),
+])  # fmt: skip
+def test_ambient_occlusion_knows_what_the_camera_does_not_see(gl, plate, reach, share):
+    scene = scenes.two_patches(distance=1.0, size=plate)
+    p = make(scene, "Ambient Occlusion", "Depth", samples=16, resolution=(64, 36), ao__distance=reach, ao__samples=16).passes
+    seen = p["Depth"][..., 0] < 1.0  # some only in part
+    assert np.median(p["Ambient Occlusion"][seen]) == pytest.approx(share, abs=0.02)
+
+
+def test_contacts_dim_alike_whether_the_occlusion_pass_is_asked_for_or_not(gl):
+    alone, both = (make(scenes.cornell(), *o, samples=2).passes["Diffuse Indirect"]
+                   for o in (("Diffuse Indirect",), ("Diffuse Indirect", "Ambient Occlusion")))  # fmt: skip
+    np.testing.assert_array_equal(alone, both)
+
+
 def test_a_flat_plane_never_lights_itself(gl):
     scene = scenes.plane_scene(scenes.point_light((0, 0, 1), 100.0))
     assert make(scene, "Diffuse Indirect", samples=4).passes["Diffuse Indirect"].max() == 0.0
@@ -383,3 +402,24 @@ def test_blocks_in_the_box_shade_indirect_light_as_in_cycles(blender, gl):
     pictures_to("rsm", "cornell-blocks", test=tests["CELLS"], reference=reference)
     assert 0.93 < tests["CELLS"].sum() / reference.sum() < 1.05
     assert rel_mse(tests["CELLS"], *halves) < 0.2 * rel_mse(tests["NONE"], *halves)
+
+
+@pytest.mark.blender
+@pytest.mark.parametrize("blocks", [False, True])
+def test_ambient_occlusion_in_the_box_is_that_of_cycles(blender, gl, blocks):
+    """Within 10 m, so what closes the box counts, seen or not: gain .95 to 1.05, and less than a tenth of the screen's error."""
+    from gi_addon.host.build import build
+    from gi_addon.host.cycles import Reference, render_passes, set_up
+
+    scene, halves, size = scenes.cornell(light="area", blocks=blocks), [], (96, 54)
+    for seed in (1, 2):
+        there = build(scene)
+        there.render.resolution_x, there.render.resolution_y, there.render.resolution_percentage = *size, 100
+        set_up(there, Reference(1, 64, seed))
+        halves.append(render_passes(there, ("Ambient Occlusion",))["Ambient Occlusion"][..., :3])
+    reference = (halves[0] + halves[1]) / 2
+    test = make(scene, "Ambient Occlusion", samples=16, resolution=size).passes["Ambient Occlusion"]
+    pictures_to("rsm", f"ao-{blocks}", test=test, reference=reference)
+    screen = make(scene, "Ambient Occlusion", samples=16, resolution=size, technique="SSDO", ssdo__occlusion="MITTRING")
+    assert 0.95 < test.sum() / reference.sum() < 1.05
+    assert rel_mse(test, *halves) < 0.1 * rel_mse(screen.passes["Ambient Occlusion"], *halves)

@@ -42,7 +42,7 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         TranslucentBack(),
         TranslucentTint(),
         GBufferMips(),
-        AOGeneration(),
+        AOGeneration(cells="ao" in layers),  # only the pass itself asks farther than contacts
         AOBlur(),
         InterpolatedIndirect(settings),
         IndirectLighting(settings),

@@ -1,16 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Ambient occlusion from the depth buffer, and its blur."""
+"""Ambient occlusion from the depth buffer and the grid of cells, and its blur."""
 
 from __future__ import annotations
 
 from ..facts import Facts
 from ..frame import Frame
-from ..graph import Pass, Planned, Texture, Uniform
+from ..graph import Optional, Pass, Planned, Texture, Uniform
 from .gbuffer import _screen
-from .occupancy import cell_grid
+from .occupancy import CELL_UNIFORMS, cell_grid, set_cells
 
 
 class AOGeneration(Pass):
+    """Occluders near by, from the screen; farther ones too, from the grid of cells if ``cells``."""
+
     title = "AO Generation"
     figure = "RSM AO Generation / SSAO Generation"
     reads = ("gbuffer.depth", "gbuffer.normal")
@@ -23,8 +25,16 @@ class AOGeneration(Pass):
         Uniform("ao_steps", "int", "depth tests along each"),
         Uniform("ao_distance", "float", "how far an occluder counts, m"),
         Uniform("ao_contact", "float", "how far one dims untested indirect light, m"),
+        *CELL_UNIFORMS,
     )
     shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "passes/ao_frag.glsl"}}
+
+    def __init__(self, *, cells: bool = False) -> None:
+        if cells:
+            self.reads = (*type(self).reads, Optional("occupancy"))
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return {} if Optional("occupancy") in self.reads else {"HAS_OCCUPANCY": 0}
 
     def absent(self, facts: Facts) -> str | None:
         return None if facts.settings.use_ao else "ambient occlusion is switched off"
@@ -40,6 +50,8 @@ class AOGeneration(Pass):
             ao_distance=min(facts.ao_distance, 2.0 * facts.radius) if "ao" in facts.layers else 0.0,
             ao_contact=_contact(facts),
         )
+        if planned.has("occupancy"):
+            set_cells(frame, program, facts)
         frame.screen(planned, program)
 
 

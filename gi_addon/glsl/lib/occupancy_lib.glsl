@@ -60,8 +60,9 @@ vec2 cells_span(vec3 start, vec3 inverse)
     return vec2(max(max(low.x, low.y), max(low.z, 0.0)), min(high.x, min(high.y, high.z)));
 }
 
-// Distance (m) along the unit `direction` to the first cell with a surface in it after a free one; −1 if there is none.
-float cells_distance(vec3 from_ws, vec3 direction)
+// Along the unit `direction`, from `after` (m) on: how far (m) the first free cell is, and where the first cell with a surface
+// in it behind that begins and ends; −1 where there is none.
+vec3 cells_first(vec3 from_ws, vec3 direction, float after)
 {
     vec3 start = (from_ws - cell_origin_ws) / cell_size;
     direction = mix(direction, vec3(1e-6), lessThan(abs(direction), vec3(1e-6)));
@@ -69,23 +70,32 @@ float cells_distance(vec3 from_ws, vec3 direction)
     vec3 forward = step(0.0, direction);
     vec2 span = cells_span(start, inverse);
     ivec3 last = textureSize(occupancy, 0) - 1;
-    float t = span.x + 1e-3;
-    bool free_before = span.x > 0.0;
-    float hit = -1.0;
+    float skip = after / cell_size;
+    float t = max(span.x, skip) + 1e-3;
+    float open_ = span.x > skip ? skip : -1.0;
+    vec2 hit = vec2(-1.0);
     for (int i = 0; i < CELL_STEPS; ++i) {
-        if (t < span.y && hit < 0.0) {
+        if (t < span.y && hit.x < 0.0) {
             vec3 p = start + direction * t;
             float level = floor(texelFetch(occupancy, clamp(ivec3(floor(p)), ivec3(0), last), 0).r * 255.0 + 0.5);
             bool solid = level < 0.5;
-            hit = solid && free_before ? t : hit;
-            free_before = free_before || !solid;
-            t += max(cell_exit(p, inverse, forward, exp2(max(level - 1.0, 0.0))), 0.0) + 1e-3;
+            float next = t + max(cell_exit(p, inverse, forward, exp2(max(level - 1.0, 0.0))), 0.0) + 1e-3;
+            hit = solid && open_ >= 0.0 ? vec2(t, next) : hit;
+            open_ = open_ < 0.0 && !solid ? t : open_;
+            t = next;
+        } else {
+            break;
         }
     }
     // Out of steps within the grid: among surfaces, so not past them.
-    hit = hit < 0.0 && t < span.y ? t : hit;
-    return hit < 0.0 ? -1.0 : hit * cell_size;
+    hit = hit.x < 0.0 && t < span.y ? vec2(t) : hit;
+    // Outside the grid all is free.
+    open_ = open_ < 0.0 ? t : open_;
+    return vec3(open_ * cell_size, hit.x < 0.0 ? vec2(-1.0) : hit * cell_size);
 }
+
+// Distance (m) along the unit `direction` to the first cell with a surface in it after a free one; −1 if there is none.
+float cells_distance(vec3 from_ws, vec3 direction) { return cells_first(from_ws, direction, 0.0).y; }
 
 // The next run of occupied cells along a ray in cells (`direction` a unit vector without zeros) that free cells come before,
 // from `t` on; `t` ends behind it. `far` in cells. False where there is none.

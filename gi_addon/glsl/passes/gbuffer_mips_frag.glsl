@@ -3,6 +3,7 @@
 // sub-frames, so that nothing of it is seen in their mean.
 
 #include "lib/view_lib.glsl"
+#include "lib/math_lib.glsl"
 #include "lib/sequence_lib.glsl"
 #include "passes/gather_grid.glsl"
 
@@ -13,6 +14,8 @@ void main()
     ivec2 size = textureSize(gbuf_depth, 0);
     bool nearest = ((block.x + block.y) & 1) == 0;
     float best = 0.0;
+    vec3 best_ws = vec3(0.0);
+    vec3 best_ng = vec3(0.0);
     ivec2 pick = ivec2(0);
     for (int y = 0; y < GATHER_SCALE; ++y) {
         for (int x = 0; x < GATHER_SCALE; ++x) {
@@ -26,10 +29,14 @@ void main()
             if (depth <= 0.0) {
                 continue;
             }
-            // Within 1 % of the best so far is the same surface: the middle stays.
-            bool better = nearest ? depth < best * 0.99 : depth > best * 1.01;
-            if (best <= 0.0 || better) {
+            vec3 position_ws = position_ws_from_depth((vec2(pixel) + 0.5) * view.inverse_resolution, depth);
+            // On the plane of the best so far by interpolate.glsl's measure is the same surface: the middle stays, slanted or not,
+            // since that is where interpolation takes the block's light to be.
+            bool same = abs(dot(position_ws - best_ws, best_ng)) <= 0.5 * float(GATHER_SCALE) * pixel_width(depth);
+            if (best <= 0.0 || (!same && (nearest ? depth < best : depth > best))) {
                 best = depth;
+                best_ws = position_ws;
+                best_ng = octahedral_decode(texelFetch(gbuf_normal, pixel, 0).zw);
                 pick = p;
             }
         }

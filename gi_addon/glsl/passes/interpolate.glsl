@@ -7,8 +7,9 @@
 // linear irradiance model E(n) ∝ R0/4 + R1·n/2 (R. Ramamoorthi and P. Hanrahan, SIGGRAPH 2001, orders 0 and 1).
 
 const float SAME_FACING = 0.906; // cos 25°
-// Share of the bilinear weight that must be on the pixel's surface.
-const float ENOUGH = 0.5;
+// Share of the bilinear weight that must be on the pixel's surface: all of it but for rounding. With a neighbour missing, light
+// that falls off towards an edge would be taken from one side of the pixel only, and jump as the grid moves.
+const float ENOUGH = 0.99;
 
 float linear_irradiance(vec4 direction, vec3 n) { return max(0.25 * direction.w + 0.5 * dot(direction.xyz, n), 0.0); }
 
