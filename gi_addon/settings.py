@@ -114,7 +114,7 @@ class WorldSettings:
     )  # fmt: skip
     rays: int = _setting(
         32, "Rays", "Further directions per sub-frame whose shadows the grid of cells tells, to smooth diffuse light between "
-        "those with maps; their mean adds no light. 0 switches them off", low=0, high=1024,
+        "those with maps; their mean adds no light. 0 is without", low=0, high=1024,
         higher="smoother sky light through openings", lower="faster",
     )  # fmt: skip
 

@@ -56,12 +56,13 @@ TRAITS: dict[str, Traits] = {
 _GATHER = "the low-resolution gather moves with the pixels, a block of them being as large as the corner; gather_scale 1 passes"
 _NOISE = "one sub-frame is noise that moves with the camera; 16 sub-frames and gather_scale 1 pass"
 KNOWN: dict[tuple[str, str], str] = {
-    ("SSDO", "8"): _GATHER,
+    **dict.fromkeys((("SSDO", "8"), ("VCT", "8")), _GATHER),
     ("VCT", "6"): _NOISE,
     ("SSDO", "6"): "noise that moves with the camera: .036; 16 sub-frames with gather_scale 1 leave .015",
     ("SSDO", "7"): "what it gathers is the screen: the plate moves by whole pixels, so 22 of 24 steps change nothing",
     ("SSDO", "10"): "rays differ from pixel to pixel: 16 sub-frames leave 6.7 % of noise, 64 leave 3.1 %",
-    ("RSM", "3"): "the brightest pixel is at 1.024, with gather_scale 1 too; the mean holds",
+    ("RSM", "3"): "the brightest pixel is at 1.012, by the noise of the world's few directions; the mean holds",
+    ("SSDO", "3"): "the brightest pixel is at 1.015, by the noise of the world's few directions; the mean holds",
     ("LPV", "1"): "a lamp 0.2 R from the wall: g = 0.85 in a grid of 32 cells; lamps further off pass",
     ("LPV", "13"): "small bright patches show as rays of the ordinates: the error grows by 48 % from one grid to the next finer",
     ("LPV", "14"): "10.3 % between 0 and 45 degrees in a grid of 32 cells",
