@@ -66,6 +66,7 @@ LONG_NAMES = {o.short: o.name for o in OUTPUTS.values()}
 #   subsurface.direct, .indirect          direct.diffuse and indirect.diffuse after scattering below the surface; alpha: the
 #                                         share of the surface's colour that they are for
 #   gbuffer.transmission                  tint of the refracting surfaces in front; 1 where there is none
+#   transmission.direct                   light from behind through translucent surfaces, tinted; alpha 1 where there are any
 #   transmission.indirect                 radiance that arrives through them, tinted, where the technique knows it (alpha 1);
 #                                         elsewhere they show what is straight behind
 #   volume.light                          radiance scattered towards the eye in front of the surface; alpha: the mean share
@@ -74,23 +75,28 @@ LONG_NAMES = {o.short: o.name for o in OUTPUTS.values()}
 LAYERS: dict[str, tuple[str, ...]] = {
     "combined": (
         "gbuffer.depth", "gbuffer.diffuse", "gbuffer.emission", "direct.diffuse", "direct.glossy", "reflected.sources",
-        "indirect.diffuse", "indirect.glossy", "gbuffer.transmission", "transmission.indirect", "volume.light",
+        "indirect.diffuse", "indirect.glossy", "gbuffer.transmission", "transmission.direct", "transmission.indirect",
+        "volume.light",
         "volume.transmittance", "subsurface.direct", "subsurface.indirect",
     ),
     "depth": ("gbuffer.depth",),
     "normal": ("gbuffer.depth", "gbuffer.normal"),
-    "diffuse_direct": ("gbuffer.depth", "gbuffer.diffuse", "direct.diffuse", "subsurface.direct", "volume.transmittance"),
-    "diffuse_indirect": ("gbuffer.depth", "gbuffer.diffuse", "indirect.diffuse", "subsurface.indirect", "volume.transmittance"),
-    "diffuse_color": ("gbuffer.depth", "gbuffer.diffuse", "volume.transmittance"),
+    "diffuse_direct": ("gbuffer.depth", "gbuffer.diffuse", "direct.diffuse", "subsurface.direct", "gbuffer.transmission",
+                       "transmission.direct", "volume.transmittance"),
+    "diffuse_indirect": ("gbuffer.depth", "gbuffer.diffuse", "indirect.diffuse", "subsurface.indirect", "gbuffer.transmission",
+                         "transmission.direct", "transmission.indirect", "volume.transmittance"),
+    "diffuse_color": ("gbuffer.depth", "gbuffer.diffuse", "gbuffer.transmission", "transmission.direct",
+                      "volume.transmittance"),
     "glossy_direct": ("gbuffer.depth", "direct.glossy", "reflected.sources", "volume.transmittance"),
     "glossy_indirect": ("gbuffer.depth", "indirect.glossy", "volume.transmittance"),
     "glossy_color": ("gbuffer.depth", "gbuffer.normal", "gbuffer.specular", "gbuffer.lobe", "brdf.albedo",
                      "brdf.average", "brdf.energy", "volume.transmittance"),
     "transmission_direct": ("gbuffer.depth", "gbuffer.transmission", "gbuffer.diffuse", "gbuffer.emission",
-                            "direct.diffuse", "direct.glossy", "reflected.sources", "volume.transmittance"),
+                            "direct.diffuse", "direct.glossy", "reflected.sources", "transmission.direct",
+                            "volume.transmittance"),
     "transmission_indirect": ("gbuffer.depth", "gbuffer.transmission", "gbuffer.diffuse", "gbuffer.emission",
                               "direct.diffuse", "direct.glossy", "reflected.sources", "indirect.diffuse", "indirect.glossy",
-                              "transmission.indirect", "volume.transmittance"),
+                              "transmission.direct", "transmission.indirect", "volume.transmittance"),
     "transmission_color": ("gbuffer.depth", "gbuffer.transmission", "volume.transmittance"),
     "volume_direct": ("volume.light",),
     "emission": ("gbuffer.depth", "gbuffer.emission", "volume.transmittance"),

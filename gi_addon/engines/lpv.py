@@ -20,7 +20,7 @@ from ..gpu_types import LIGHT_AREA, LIGHT_SUN, LIGHT_WORLD
 from ..graph import Buffer, Optional, Pass, Planned, Texture, Uniform
 from ..passes.ao import AOBlur
 from ..passes.brdf_tables import BRDFTables
-from ..passes.direct_lighting import DirectLighting
+from ..passes.direct_lighting import DirectLighting, TranslucentLighting
 from ..passes.gbuffer import GBuffer, TranslucentBack, TranslucentLayer, TranslucentTint, _screen
 from ..passes.lights import LightList, RSMGeneration, ShadowMaps
 from ..passes.occupancy import Occupancy
@@ -72,6 +72,7 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         Subsurface(),
         WorldRays(),
         DirectLighting(),
+        TranslucentLighting(),
         Volumetric(),
         Resolve(layers),
     ]

@@ -14,7 +14,7 @@ from ..gpu_types import LIGHT_MESH, VPL
 from ..graph import Buffer, Optional, Pass, Planned, Texture, Uniform
 from ..passes.ao import AOBlur, AOGeneration
 from ..passes.brdf_tables import BRDFTables
-from ..passes.direct_lighting import DirectLighting
+from ..passes.direct_lighting import DirectLighting, TranslucentLighting
 from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint, _screen, gather_size
 from ..passes.lights import LightList, RSMGeneration, ShadowMaps
 from ..passes.occupancy import CELL_UNIFORMS, Occupancy, set_cells
@@ -50,6 +50,7 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         Subsurface(),
         WorldRays(),
         DirectLighting(),
+        TranslucentLighting(),
         GlossyReflections(),
         Refraction(),
         Volumetric(),

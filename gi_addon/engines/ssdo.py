@@ -20,7 +20,7 @@ from ..gpu_types import LIGHT_SUN, LIGHT_WORLD
 from ..graph import Optional, Pass, Planned, Texture, Uniform
 from ..passes.ao import AOBlur, AOGeneration
 from ..passes.brdf_tables import BRDFTables
-from ..passes.direct_lighting import DirectLighting
+from ..passes.direct_lighting import DirectLighting, TranslucentLighting
 from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint, _screen
 from ..passes.lights import LightList, ShadowMaps
 from ..passes.occupancy import Occupancy
@@ -67,6 +67,7 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         Reflections(),
         TranslucentLayer(),
         TranslucentBack(),
+        TranslucentLighting(),
         Refraction(),
         Subsurface(),
         Volumetric() if settings.ssdo.volumetric == "MARCH" else RadialBlur(),

@@ -12,7 +12,7 @@ from ..facts import Facts
 from ..frame import Frame
 from ..graph import Optional, Pass, Planned, Texture, Uniform
 from ..passes.brdf_tables import BRDFTables
-from ..passes.direct_lighting import DirectLighting
+from ..passes.direct_lighting import DirectLighting, TranslucentLighting
 from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint, _screen
 from ..passes.lights import LightList, RSMGeneration, ShadowMaps
 from ..passes.occupancy import Occupancy
@@ -54,6 +54,7 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         Subsurface(),
         WorldRays(),
         DirectLighting(),
+        TranslucentLighting(),
         RefractionCones(),
         VoxelVolumetric(),
         Resolve(layers),

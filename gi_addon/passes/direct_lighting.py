@@ -7,7 +7,7 @@ from ..facts import Facts
 from ..frame import Frame
 from ..graph import Optional, Pass, Planned, Texture, Uniform
 from ..sequence import sobol_2d
-from .gbuffer import _screen
+from .gbuffer import _nothing_refracts, _screen
 from .volumetric import MEDIUM_UNIFORMS, medium_defines, set_medium
 
 
@@ -54,3 +54,29 @@ class DirectLighting(Pass):
             filter_turn=float(sobol_2d(frame.subframe, 3)[0]) * 6.2831853,
         )
         frame.screen(planned, program)
+
+
+class TranslucentLighting(Pass):
+    """Direct light through surfaces that scatter it to their other side."""
+
+    title = "Translucent Direct Lighting"
+    figure = "Direct Lighting Computation"
+    reads = (
+        "lights", Optional("lights.views"), Optional("shadow.depth"), Optional("rsm.depth"), "translucent.depth",
+        "translucent.normal", "translucent.color", "translucent.medium",
+    )  # fmt: skip
+    writes = (
+        Texture("transmission.direct", "transmission_direct", "radiance that light from behind leaves with, tinted, W/(m²·sr); "
+                "alpha 1 where the surface scatters, 0 where it refracts", "rgba32f", _screen),
+    )  # fmt: skip
+    uniforms = DirectLighting.uniforms
+    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "passes/translucent_light_frag.glsl"}}
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return medium_defines(facts)
+
+    def absent(self, facts: Facts) -> str | None:
+        return _nothing_refracts(facts) or (None if facts.lit else "no light shines")
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        DirectLighting.run(self, frame, planned)

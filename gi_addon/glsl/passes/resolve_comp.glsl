@@ -98,6 +98,18 @@ void main()
 #endif
         diffuse_color = diffuse_direct = diffuse_indirect = glossy_direct = glossy_indirect = vec3(0.0);
         emission = environment = vec3(0.0);
+#if HAS_TRANSMISSION_DIRECT
+        // What scatters light is diffuse to Cycles, and shows nothing of what is straight behind.
+        vec4 scattered = texelFetch(transmission_direct, pixel, 0);
+        if (scattered.a > 0.0) {
+            diffuse_direct = scattered.rgb;
+            diffuse_color = through_color;
+#if HAS_TRANSMISSION_INDIRECT
+            diffuse_indirect = refracted.a > 0.0 ? refracted.rgb : vec3(0.0);
+#endif
+            through_color = through_direct = through_indirect = vec3(0.0);
+        }
+#endif
     } else {
         through_color = vec3(0.0);
     }

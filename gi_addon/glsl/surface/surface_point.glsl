@@ -70,6 +70,9 @@ float surface_opacity(Closure c)
 #if SURFACE_SEE_THROUGH_GLASS
     through += vector_mean(c.transmission);
 #endif
+#if SURFACE_SEEN_BY_CAMERA
+    through += vector_mean(c.translucent); // shaded with the refracting surfaces; to light it is as solid as paper
+#endif
     return saturate(1.0 - through);
 }
 

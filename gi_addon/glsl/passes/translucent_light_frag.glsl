@@ -1,0 +1,58 @@
+// Light that arrives straight from its source at the far side of a translucent surface and leaves, scattered evenly, on this
+// one: L = tint E/π with the irradiance E of the side that faces away from the eye (Lambert transmission, Cycles'
+// Translucent BSDF). Alpha is 1 there, 0 where a surface refracts instead.
+
+#include "lib/view_lib.glsl"
+#include "lib/math_lib.glsl"
+#include "lib/sequence_lib.glsl"
+#include "lib/shadow_lib.glsl"
+#if HAS_MEDIUM
+#include "lib/medium_lib.glsl"
+#endif
+
+void main()
+{
+    ivec2 pixel = ivec2(gl_FragCoord.xy);
+    vec2 uv = gl_FragCoord.xy * view.inverse_resolution;
+    float depth = texelFetch(translucent_depth, pixel, 0).r;
+    transmission_direct = vec4(0.0);
+    if (depth <= 0.0 || texelFetch(translucent_medium, pixel, 0).g < 0.5) {
+        return;
+    }
+    float turn = filter_turn + TAU * unit_float(hash_u32(uvec2(pixel + view.pixel_offset)));
+    vec3 position_ws = position_ws_from_depth(uv, depth);
+    vec4 normals = texelFetch(translucent_normal, pixel, 0);
+    // Towards the far side.
+    vec3 n = -octahedral_decode(normals.xy);
+    vec3 ng = -octahedral_decode(normals.zw);
+    vec3 irradiance = vec3(0.0);
+    for (int i = 0; i < light_count; ++i) {
+        Light light = lights[i];
+        vec3 l;
+        float angle;
+        vec3 arriving = light_arriving(light, position_ws, l, angle);
+        float cos_l = dot(n, l);
+        if (cos_l <= 0.0 || dot(ng, l) <= 0.0 || max3(arriving) <= 0.0) {
+            continue;
+        }
+        float visible = 1.0;
+        if (light.views > 0) {
+            LightView v = light_views[light_view_of(light, position_ws)];
+#if HAS_SHADOW_DEPTH
+            if (v.map == MAP_SHADOW) {
+                visible = light_visibility(shadow_depth, light, v, position_ws, ng, softness, turn);
+            }
+#endif
+#if HAS_RSM_DEPTH
+            if (v.map == MAP_BOUNCE) {
+                visible = light_visibility(rsm_depth, light, v, position_ws, ng, softness, turn);
+            }
+#endif
+        }
+#if HAS_MEDIUM
+        arriving *= medium_transmittance(position_ws, l, light_is_directional(light) ? 1e30 : length(light.position_ws - position_ws));
+#endif
+        irradiance += light.diffuse * arriving * (cos_l * visible);
+    }
+    transmission_direct = vec4(irradiance * INV_PI * texelFetch(translucent_color, pixel, 0).rgb, 1.0);
+}
