@@ -306,7 +306,8 @@ def register() -> None:
 def unregister() -> None:
     for panel in bpy.types.Panel.__subclasses__():
         engines = getattr(panel, "COMPAT_ENGINES", None)
-        if engines and "QUARTET" in engines:
+        # Quartet's own panels keep theirs: they are registered again with the same classes.
+        if engines and "QUARTET" in engines and len(engines) > 1:
             engines.discard("QUARTET")
     close_all()
     bpy.utils.unregister_class(QuartetEngine)
