@@ -346,6 +346,9 @@ def register() -> None:
                    QUARTET_PT_passes, QUARTET_PT_object_visibility, QUARTET_PT_light_shadow,
                    QUARTET_PT_world_distance]  # fmt: skip
     for cls in _classes:
+        # Unregistering took the engine out of every panel's list, these among them.
+        if hasattr(cls, "COMPAT_ENGINES"):
+            cls.COMPAT_ENGINES.add("QUARTET")
         bpy.utils.register_class(cls)
 
 

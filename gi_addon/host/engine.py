@@ -306,8 +306,7 @@ def register() -> None:
 def unregister() -> None:
     for panel in bpy.types.Panel.__subclasses__():
         engines = getattr(panel, "COMPAT_ENGINES", None)
-        # Quartet's own panels keep theirs: they are registered again with the same classes.
-        if engines and "QUARTET" in engines and len(engines) > 1:
+        if engines and "QUARTET" in engines:
             engines.discard("QUARTET")
     close_all()
     bpy.utils.unregister_class(QuartetEngine)
