@@ -23,7 +23,7 @@ from ..passes.brdf_tables import BRDFTables
 from ..passes.direct_lighting import DirectLighting, TranslucentLighting
 from ..passes.gbuffer import GBuffer, TranslucentBack, TranslucentLayer, TranslucentTint, _screen
 from ..passes.lights import LightList, RSMGeneration, ShadowMaps
-from ..passes.occupancy import Occupancy
+from ..passes.occupancy import CELL_UNIFORMS, Occupancy, set_cells
 from ..passes.resolve import Resolve
 from ..passes.volumetric import MEDIUM_UNIFORMS, Volumetric, air, medium_defines, set_medium
 from ..passes.world_guide import WorldGuide
@@ -67,12 +67,12 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         AmbientOcclusion(),
         AOBlur(),
         IndirectLighting(),
-        GlossyLighting(),
-        Refraction(),
         Subsurface(),
         WorldRays(),
         DirectLighting(),
         TranslucentLighting(),
+        GlossyLighting(),
+        Refraction(),
         Volumetric(),
         Resolve(layers),
     ]
@@ -249,6 +249,14 @@ def fixed_point_groups(lights: np.ndarray, cell: float) -> list[tuple[float, set
     return groups
 
 
+def _no_albedo(facts: Facts) -> str | None:
+    """Why nobody asks for the walls' albedo."""
+    mirrored = facts.settings.use_glossy and facts.glossy
+    if facts.settings.bounces > 1 or mirrored:
+        return None
+    return "light bounces once, off what the lights see, and nothing mirrors the rest"
+
+
 class GeometryInjection(Pass):
     """Which share of the way between neighbouring cells is blocked, by drawing the scene along each axis."""
 
@@ -262,14 +270,14 @@ class GeometryInjection(Pass):
                "uint", np.dtype("u4"), lambda f: grid(f).cells * 15, scratch=True),
         Buffer("lpv.albedo", "lpv_albedo", "per cell and axis: mean of albedo over |n|₁ (a float's bits), red, green, blue",
                "uint", np.dtype("u4"), lambda f: grid(f).cells * 9,
-               when=lambda f: None if f.settings.bounces > 1 else "light bounces once, off what the lights see"),
+               when=_no_albedo),
         Texture("lpv.raster", "lpv_raster", "what the surfaces are drawn to; nobody reads it", "r8",
                 lambda f: (_POINTS * max(grid(f).size),) * 2, scratch=True),
     )  # fmt: skip
     uniforms = (*_GRID, Uniform("axis", "int", "axis that the scene is drawn along"))
     shaders = {"main": {"compute": "engines/lpv/walls_comp.glsl"}}
     depends = ("transforms", "meshes", "materials")
-    settings = ("lpv.resolution", "lpv.occlusion", "bounces")
+    settings = ("lpv.resolution", "lpv.occlusion", "bounces", "use_glossy")
 
     def rate(self, facts: Facts) -> str:
         return "static"
@@ -508,23 +516,37 @@ class AmbientOcclusion(Pass):
         frame.screen(planned, program)
 
 
+_RAY_READS = (
+    "occupancy", "rsm.depth", "rsm.normal", "rsm.albedo", "rsm.lights", "rsm.views", "lpv.volume", "lpv.walls", "lpv.albedo",
+    "gbuffer.depth", "gbuffer.normal", Optional("gbuffer.diffuse"), Optional("direct.diffuse"), Optional("indirect.diffuse"),
+    Optional("vpls"), Optional("gbuffer.emission", ("transmission.indirect",)),
+)  # fmt: skip
+_RAY_UNIFORMS = (
+    *_GRID, *CELL_UNIFORMS, *MEDIUM_UNIFORMS, Uniform("rsm_light_count", "int", "lights with reflective shadow maps"),
+)  # fmt: skip
+
+
+def _set_ray(frame: Frame, program, facts: Facts, **more) -> None:
+    set_cells(frame, program, facts)
+    set_medium(frame, program, facts)
+    _set_grid(frame, program, facts, rsm_light_count=len(facts.rig.sources), **more)
+
+
 class GlossyLighting(Pass):
-    """Rays of the glossy lobe through the volume."""
+    """Rays of the glossy lobe to the surfaces they meet."""
 
     title = "LPV Glossy Computation"
     figure = "LPV Lighting Computation"
-    reads = (
-        "lpv.volume", "lpv.walls", "gbuffer.depth", "gbuffer.normal", "gbuffer.specular", "gbuffer.lobe", "brdf.energy",
-        "brdf.average",
-    )  # fmt: skip
+    source = "lamps' light on what is mirrored from RSMs, bounces from the volume, hits from cells"
+    reads = (*_RAY_READS, "gbuffer.specular", "gbuffer.lobe", "brdf.energy", "brdf.average")
     writes = (
         Texture("indirect.glossy", "indirect_glossy", "radiance that the glossy lobe reflects, W/(m²·sr)", "rgba32f", _screen),
     )
-    uniforms = (*_GRID, Uniform("glossy_rays", "int", "rays per pixel"))
+    uniforms = (*_RAY_UNIFORMS, Uniform("glossy_rays", "int", "rays per pixel"))
     shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/lpv/glossy_frag.glsl"}}
 
     def defines(self, facts: Facts) -> dict[str, int]:
-        return {"MARCH_STEPS": _march_steps(facts), "MARCH_LIGHT": 1, "HAS_LPV_WALLS": 1}
+        return {"MESH_LIGHTS": 0, **medium_defines(facts)}  # raycast_lib can gather virtual lights; here are none
 
     def absent(self, facts: Facts) -> str | None:
         if not facts.settings.use_glossy:
@@ -533,7 +555,7 @@ class GlossyLighting(Pass):
 
     def run(self, frame: Frame, planned: Planned) -> None:
         program = frame.program(planned)
-        _set_grid(frame, program, planned.facts, glossy_rays=planned.facts.settings.lpv.glossy_rays)
+        _set_ray(frame, program, planned.facts, glossy_rays=planned.facts.settings.lpv.glossy_rays)
         frame.screen(planned, program)
 
 

@@ -72,13 +72,12 @@ VolumeSample volume_sample(vec3 at, vec3 surface, vec3 n)
     return s;
 }
 
-// In front of a surface seen from `eye_ws` (unit vector towards it). What the eye sees is on the open side of all walls, which a
-// point on an edge would not tell: it is moved to the eye so far that walls, whose places are rounded to 1/255, are passed by
-// lines of sight 5° and more off them.
-VolumeSample volume_at_surface(vec3 position_ws, vec3 ng, vec3 eye_ws)
+// In front of a surface at grid point `surface` seen from `eye` (unit vector towards it). What the eye sees is on the open side
+// of all walls, which a point on an edge would not tell: it is moved to the eye so far that walls, whose places are rounded to
+// 1/255, are passed by lines of sight 5° and more off them.
+VolumeSample volume_in_front(vec3 surface, vec3 ng, vec3 eye)
 {
-    vec3 surface = (position_ws - grid_origin) / grid_cell;
-    return volume_sample(surface + ng * half_cell_shift(ng) + eye_ws * 0.05, surface, ng);
+    return volume_sample(surface + ng * half_cell_shift(ng) + eye * 0.05, surface, ng);
 }
 
 // E/π on a surface of unit normal n. Harmonics of order 2 of light from a side go below 0 behind it by a few per cent.
