@@ -8,11 +8,14 @@
 // L_a is the neighbour upwind along axis a, κ_a the covered share of the face between. Each term is a flux per solid angle, so
 // that without surfaces flux is conserved exactly; an isotropic field in a closed black cavity is exact too.
 //
-// Walls at an angle to the grid. Their steps are more area than the wall (|n|₁ times), and would take too much light. With n
-// turned to the cell's side: a blocked face ahead whose surface the light does not meet (ω·n ≥ 0) lets nothing through and
-// takes nothing; a blocked face behind, from which such light could not come (ω·n < 0), is no gap in what arrives. Neither
-// counts as cross-section, so that the cell's radiance is its flux over the rest:
-//     L = F/K,  F = Σ_a |ω_a| (1 − κ_a) L_a + Q/h²,  K = the smaller of Σ_behind and Σ_ahead of |ω_a| (1 − κ_a [as above]).
+// Walls at an angle to the grid. Their steps are more area than the wall (|n|₁ times), and would take and hide too much light.
+// With n turned to the cell's side, P = Σ max(ω_a n_a, 0) and M = Σ max(−ω_a n_a, 0) over the axes, a wall of area A shows the
+// ordinate A P of steps that face as it goes and A M of steps that it meets; in truth it sends A (P − M) where that is positive
+// (ω·n > 0, it leaves the wall) and takes A (M − P) where not. So of each step that light meets, the share min(1, P/M) takes
+// nothing and lets nothing through, and of each step behind, min(1, M/P) is no gap in what arrives: light comes past it from
+// where the other steps are in the grid, and air in truth. Neither counts as cross-section, so that the cell's radiance is its
+// flux over the rest:
+//     L = F/K,  F = Σ_a |ω_a| (1 − κ_a) L_a + Q/h²,  K = the smaller of Σ_behind and Σ_ahead of |ω_a| (1 − κ_a share_a).
 // What goes on is L, or less where the open faces would pass more than F; the rest of F is absorbed. An isotropic field in
 // front of a wall of any direction then stays one. Alpha holds the share of L that goes on.
 //
@@ -24,6 +27,15 @@
 #include "engines/lpv/geometry_lib.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
+
+// min(1, M/P): of a step behind that light along w leaves, the share that is air. For a step ahead, −w.
+float step_share(vec3 w, vec3 n)
+{
+    vec3 parts = w * n;
+    float leaving = dot(max(parts, vec3(0.0)), vec3(1.0));
+    float meeting = -dot(min(parts, vec3(0.0)), vec3(1.0));
+    return leaving > 1e-6 ? min(meeting / leaving, 1.0) : 1.0;
+}
 
 void main()
 {
@@ -72,7 +84,7 @@ void main()
             coverage = wall.x;
             if (coverage > 0.0) {
                 vec3 n = wall_normal(wall, axis) * (up[axis] ? 1.0 : -1.0);
-                behind -= dot(w, n) < 0.0 ? share[axis] * coverage : 0.0;
+                behind -= share[axis] * coverage * step_share(w, n);
             }
 #endif
             vec4 neighbour = imageLoad(lpv_radiance, from + ivec3(0, 0, slab));
@@ -87,7 +99,7 @@ void main()
             float coverage = wall.x;
             if (coverage > 0.0) {
                 vec3 n = wall_normal(wall, axis) * (up[axis] ? -1.0 : 1.0);
-                ahead -= dot(w, n) >= 0.0 ? share[axis] * coverage : 0.0;
+                ahead -= share[axis] * coverage * step_share(-w, n);
                 open_ahead -= share[axis] * coverage;
             }
         }
