@@ -76,6 +76,13 @@ def stability_command(techniques, tests, full, strict, output) -> None:
 @click.option("--rows", help="Only rows whose name holds this text, e.g. '512²' or '1280x720'.")
 @click.option("--limit", type=float, default=60.0, show_default=True, help="Skip a row whose first frame takes longer, s.")
 @click.option(
+    "--budget",
+    type=click.FloatRange(0.0),
+    default=60.0,
+    show_default=True,
+    help="Seconds of timed frames per row, there and back each: slow rows get fewer frames, as the table says.",
+)
+@click.option(
     "-o",
     "--output",
     type=click.Path(path_type=Path),
@@ -83,8 +90,11 @@ def stability_command(techniques, tests, full, strict, output) -> None:
     show_default=True,
     help="Folder for bench.html, bench.json and bench.csv.",
 )
-def bench_command(scene, techniques, scale, frames, rows, limit, output) -> None:
-    """The paper's Table 2 on this machine: frame rates of SCENE (Sponza, as there; a Cornell box if none is given)."""
+def bench_command(scene, techniques, scale, frames, rows, limit, budget, output) -> None:
+    """The paper's Table 2 on this machine: frame rates of SCENE (Sponza, as there; a Cornell box if none is given).
+
+    An interrupted bench goes on where it stopped.
+    """
     from .compare import bench, scenes
     from .compare.paper import TABLE_2
     from .gl import shared
@@ -113,18 +123,22 @@ def bench_command(scene, techniques, scale, frames, rows, limit, output) -> None
         frames=frames,
         rows=chosen,
         limit_s=limit,
+        budget_s=budget,
+        cache=output / "rows",
         progress=lambda text: console.print(text, style="dim", highlight=False),
     )
     table = Table(
-        "technique", "setting", "paper", "paper fps", "here", "ms moving", "ms still", "fps", "× paper", "per hardware", "MiB"
+        *("technique", "setting", "paper", "paper fps", "here"),
+        *("ms moving", "frames", "ms still", "fps", "× paper", "per hardware", "MiB"),
     )
     for r in bench.records(calibration, timings):
         paper_fps = "–" if r["paper_fps"] is None else f"{r['paper_fps']:g}{'?' if r['paper_doubtful'] else ''}"
         numbers = (
-            [r["problem"], *[""] * 5]
+            [r["problem"], *[""] * 6]
             if r["problem"]
             else [
                 f"{r['ms']:.2f} ± {r['mad']:.2f}",
+                str(r["frames"]),
                 f"{r['still_ms']:.2f}",
                 f"{r['fps']:.1f}",
                 f"{r['ratio']:.3g}" if r["ratio"] else "–",
@@ -140,14 +154,14 @@ def bench_command(scene, techniques, scale, frames, rows, limit, output) -> None
 
 
 def report_command(
-    scenes, techniques, sweep, peers, effects, references_folder, reference_samples, visits, output, options
+    scenes, techniques, sweep, peers, blender, effects, references_folder, reference_samples, visits, budget, output, options
 ) -> None:
     """Measure scenes with all candidates and write the report. ``options`` are the scene options of the command line."""
     from .cli import _blender
-    from .compare import report, study
+    from .compare import bench, report, study
     from .compare.references import BOUNCES, ready, reference
     from .compare.sweeps import peer_sweep, technique_sweep
-    from .gl import driver
+    from .gl import driver, shared
 
     names = technique_names(techniques) if techniques or not options["technique"] else technique_names(options["technique"])
     rivals = [p.strip().lower() for p in peers.split(",") if p.strip()]
@@ -158,10 +172,12 @@ def report_command(
     candidates = [c for t in names for c in technique_sweep(t, sweep)] + [c for p in rivals for c in peer_sweep(p, sweep)]
     size = options["resolution"] or (128, 72)
     measured = []
+    calibration = shared().call(bench.calibrate)
+    console.print(bench.hardware_text(calibration), highlight=False)
     for scene in scenes:
         arguments = (None, options["samples"], size, options["frame"], options["assignments"])
         with _blender(scene, *arguments) as bscene:
-            from .host import cycles, embedded, properties
+            from .host import cycles, eevee, embedded, properties
             from .host import peers as host_peers
 
             plain, size = embedded.plain(bscene)
@@ -183,10 +199,17 @@ def report_command(
 
             def run_peer(candidate, passes, bscene=bscene):
                 if candidate.method == "EEVEE":
-                    return eevee.render(candidate, passes)
+                    return other.render(candidate, passes)
                 return host_peers.render(bscene, candidate, passes)
 
-            with host_peers.Eevee(str(scene), size, options["frame"]) as eevee:
+            try:
+                program = eevee.program(blender) if "eevee" in rivals else None
+            except RuntimeError as error:
+                raise click.UsageError(f"--blender: {error}") from error
+            with eevee.Eevee(bscene, program) as other:
+                versions = dict.fromkeys(("Cycles", "Cycles + OIDN"), host_peers.VERSION)
+                if "eevee" in rivals:
+                    versions["EEVEE"] = other.version
                 runs = study.measure(
                     plain,
                     key,
@@ -196,13 +219,18 @@ def report_command(
                     driver=driver(),
                     cache=output / "runs",
                     peer=run_peer,
-                    peer_version=host_peers.VERSION,
+                    peer_versions=versions,
                     visits=visits,
+                    repeats=3 if visits > 1 else 5,
+                    budget_s=budget,
                     progress=lambda text, label=label: console.print(f"{label}: {text}", style="dim", highlight=False),
                 )
+        console.print(f"{label}: scores")
         record = study.scene_record(label, key, size, samples, runs, references, plain.triangle_count())
+        record["peers"] = {m: v for m, v in versions.items() if any(r.candidate.method == m for r in runs)}
         measured.append(report.Measured(record, runs, references))
     head = {"version": study.source_version(), "driver": driver(), "date": datetime.date.today().isoformat(), "sweep": sweep}
+    head["calibration"] = bench.hardware_text(calibration)
     extra = ""
     if effects:
         from .compare import effects as table_1

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from .page import COLORS, esc, number
+from .page import COLORS, INK, esc, number
 
 _SYMBOLS = {
     "RSM": "circle",
@@ -112,10 +112,10 @@ def pareto_figure(record: dict, component: str, reference: str, metric: str = "r
                     "color": COLORS.get(method),
                     "symbol": _SYMBOLS.get(method, "circle"),
                     "size": 10,
-                    "line": {"width": 1, "color": "#222"},
+                    "line": {"width": 1, "color": INK},
                 },
                 hovertext=[
-                    f"<b>{esc(p['method'])}</b><br>{esc(p['label'])}<br>{p['x']:.4g} ms ± {p['mad']:.2g}"
+                    f"<b>{esc(p['method'])}</b><br>{esc(p['label'])}<br>{p['x']:.4g} ms ± {p['mad']:.2g}, {p['frames']} frames"
                     f"<br>relMSE {number(p['score']['rel_mse'])} [{number(p['score']['low'])} … {number(p['score']['high'])}]"
                     f"<br>gain {number(p['score']['gain'])}, FLIP {number(p['score']['flip'])}"
                     + (f"<br>{p['mib']:.1f} MiB" if p.get("mib") else "")
@@ -132,7 +132,7 @@ def pareto_figure(record: dict, component: str, reference: str, metric: str = "r
                 y=[points[i]["y"] for i in front],
                 mode="lines",
                 name="Pareto front",
-                line={"color": "#222", "width": 1.5, "shape": "hv"},
+                line={"color": INK, "width": 1.5, "shape": "hv"},
                 hoverinfo="skip",
             )
         )

@@ -150,6 +150,7 @@ def _scene_html(index: int, scene: Measured, drawn: dict[str, object]) -> tuple[
     wall, pictures = _wall(index, scene)
     samples = record["reference_samples"]
     made = f"with {samples} samples each" if samples else "rendered elsewhere"
+    made += "".join(f"; {method}: {version}" for method, version in record.get("peers", {}).items())
     parts = [
         f'<h2 id="s{index}">{esc(record["scene"])}</h2>',
         f"<p class=quiet>{record['size'][0]} × {record['size'][1]} pixels, {record['triangles']} triangles; Cycles references of "
@@ -250,7 +251,8 @@ def write(
     top = (
         f"<h1>Quartet GI: speed against accuracy</h1><p class=lead>Quartet {esc(head['version'])} on {esc(head['driver'])}, "
         f"{esc(head['date'])}. Errors are against unbiased Cycles; R1 has one diffuse and one glossy bounce, R∞ has 32. Peers "
-        f"bounce as often as by default and are compared with R∞ only. Nothing is scaled to fit: the gain column says so.</p>"
+        f"bounce as often as by default and are compared with R∞ only; so is light that no bounce changes. Nothing is scaled to "
+        f"fit: the gain column says so.</p><p class=quiet>{esc(head.get('calibration', ''))}</p>"
         f"<nav>{links}</nav>"
     )
     data = dump(walls).replace("</", "<\\/")
