@@ -40,7 +40,10 @@ def technique_names(text: str | None) -> list[str]:
     help="Folder for stability.html and stability.json.",
 )
 def stability_command(techniques, tests, full, strict, output) -> None:
-    """Run the stability suite: value, limit and verdict of every test for every technique."""
+    """Run the stability suite: value, limit and verdict of every test for every technique.
+
+    An interrupted run goes on where it stopped.
+    """
     from .compare import stability, stability_checks  # noqa: F401 — the second fills the registry
 
     names = technique_names(techniques)
@@ -52,9 +55,10 @@ def stability_command(techniques, tests, full, strict, output) -> None:
     def said(technique: str, test: stability.Test, finding: stability.Finding) -> None:
         missed = next((q for q in finding.quantities if q.limited and not q.holds), None)
         detail = f"{missed.name} = {missed.value:.4g}, limit {missed.limit}" if missed else finding.note
-        console.print(f"{technique:5s} {test.key:>3s} {test.title:26s} {finding.verdict:14s} {detail}", highlight=False)
+        head = f"{technique:5s} {test.key:>3s} {test.title:26s} {finding.verdict:14s} {finding.seconds:5.0f} s"
+        console.print(f"{head}  {detail}", highlight=False)
 
-    results = stability.run(names, keys, full=full, progress=said)
+    results = stability.run(names, keys, full=full, cache=output / "findings", progress=said)
     table = Table("test", *names)
     for key in keys:
         table.add_row(f"{key} {stability.TESTS[key].title}", *(results[t][key].verdict for t in names))

@@ -21,10 +21,20 @@ def source_version() -> str:
     return f"{__version__}+{h.hexdigest()}"
 
 
+def _fingerprint_of(*names: str) -> str:
+    h = hashlib.blake2b(digest_size=6)
+    for name in names:
+        h.update((Path(__file__).parent / name).read_bytes())
+    return h.hexdigest()
+
+
 @cache
 def scoring_version() -> str:
     """A fingerprint of what makes figures of pictures."""
-    h = hashlib.blake2b(digest_size=6)
-    for name in ("metrics.py", "study.py"):
-        h.update((Path(__file__).parent / name).read_bytes())
-    return h.hexdigest()
+    return _fingerprint_of("metrics.py", "study.py")
+
+
+@cache
+def checks_version() -> str:
+    """A fingerprint of what the stability suite checks."""
+    return _fingerprint_of("stability.py", "stability_checks.py", "closed_forms.py", "scenes.py", "metrics.py")
