@@ -49,11 +49,11 @@ def hypervolume(points: Sequence[tuple[float, float]], corner: tuple[float, floa
 
 
 def points_of(record: dict, component: str, reference: str, metric: str) -> list[dict]:
-    """The candidates of a scene record that have a figure for this component, with ``x`` (ms) and ``y``. Peers bounce on:
-    one bounce is no reference for them."""
+    """The candidates of a scene record that have a figure for this component, with ``x`` (ms) and ``y``. Peers bounce on,
+    and so do candidates with more bounces: one bounce is no reference for them."""
     out = []
     for c in record["candidates"]:
-        if reference == "R1" and not c["technique"]:
+        if reference == "R1" and (not c["technique"] or c["options"].get("bounces", 1) > 1):
             continue
         s = c["scores"].get(component, {}).get(reference)
         if s is not None and s.get(metric) is not None and math.isfinite(s[metric]):
@@ -136,6 +136,9 @@ def pareto_figure(record: dict, component: str, reference: str, metric: str = "r
                 hoverinfo="skip",
             )
         )
+    for rank, i in enumerate(front if metric == "rel_mse" else (), 1):
+        place = {"x": math.log10(points[i]["x"]), "y": math.log10(points[i]["y"])}
+        figure.add_annotation(**place, text=str(rank), showarrow=False, xshift=-12, yshift=-12, font={"size": 11})
     if points and metric == "rel_mse":
         null = points[0]["score"]
         ends = [min(p["x"] for p in points) / 1.3, max(p["x"] for p in points) * 1.3]
