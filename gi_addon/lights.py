@@ -233,6 +233,12 @@ class LightRig:
         """Whether the source's bounce map serves as its shadow map."""
         return self.shadow.first[index] < 0 <= self.bounce.first[index] and self.casts_shadow(index)
 
+    def beyond(self, view: int, light: int) -> np.ndarray | None:
+        """The box (2, 3) whose contents shadow map ``view`` of source ``light`` leaves out: what shades nothing outside the
+        narrow map of the same source. Coarse texels would."""
+        wide = self.sources[light].near and view > self.shadow.first[light]
+        return self.focus.core if wide else None
+
     def casts_shadow(self, index: int) -> bool:
         light = self.sources[index].light
         return light is None or light.use_shadow
