@@ -117,11 +117,11 @@ class Source:
     light: Light | None = None
     views: int = 0
     soft: bool = False
-    # A second shadow map, of the focus alone, where a backdrop would leave the first one coarse.
-    near: bool = False
     # World and meshes: this source draws points `index` of every `count` per sub-frame.
     index: int = 0
     count: int = 1
+    # A second shadow map, of the focus alone, where a backdrop would leave the first one coarse.
+    near: bool = False
 
 
 @dataclass
