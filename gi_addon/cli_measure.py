@@ -178,6 +178,7 @@ def report_command(
     measured = []
     calibration = shared().call(bench.calibrate)
     console.print(bench.hardware_text(calibration), highlight=False)
+    frames = shared().call(bench.frames_asked)
     for scene in scenes:
         arguments = (None, options["samples"], size, options["frame"], options["assignments"])
         with _blender(scene, *arguments) as bscene:
@@ -225,7 +226,7 @@ def report_command(
                     peer=run_peer,
                     peer_versions=versions,
                     visits=visits,
-                    repeats=3 if visits > 1 else 5,
+                    repeats=-(-frames // visits),
                     budget_s=budget,
                     progress=lambda text, label=label: console.print(f"{label}: {text}", style="dim", highlight=False),
                 )
