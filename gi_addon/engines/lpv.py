@@ -21,10 +21,20 @@ from ..graph import Buffer, Optional, Pass, Planned, Texture, Uniform
 from ..passes.ao import AOBlur
 from ..passes.brdf_tables import BRDFTables
 from ..passes.direct_lighting import DirectLighting, TranslucentLighting
-from ..passes.gbuffer import GBuffer, TranslucentBack, TranslucentLayer, TranslucentTint, _screen
+from ..passes.gbuffer import GBuffer, TranslucentBack, TranslucentLayer, TranslucentTint
 from ..passes.lights import LightList, RSMGeneration, ShadowMaps
 from ..passes.occupancy import CELL_UNIFORMS, Occupancy, set_cells
 from ..passes.resolve import Resolve
+from ..passes.screen import (
+    INDIRECT_DIFFUSE,
+    INDIRECT_GLOSSY,
+    LOBE,
+    REFRACTING,
+    TRANSMISSION_INDIRECT,
+    ScreenPass,
+    _screen,
+    no_gloss,
+)
 from ..passes.volumetric import MEDIUM_UNIFORMS, Volumetric, air, medium_defines, set_medium
 from ..passes.world_guide import WorldGuide
 from ..passes.world_rays import WorldRays
@@ -108,7 +118,7 @@ class Grid:
 
 def grid(facts: Facts) -> Grid:
     """The frame's grid."""
-    return Grid.over(facts.rig.bounds, facts.settings.lpv.resolution)
+    return Grid.over(facts.rig.region, facts.settings.lpv.resolution)
 
 
 def _sh_size(facts: Facts) -> tuple[int, int, int]:
@@ -276,10 +286,10 @@ def fixed_point_groups(lights: np.ndarray, cell: float) -> list[tuple[float, set
 
 def _no_albedo(facts: Facts) -> str | None:
     """Why nobody asks for the walls' albedo."""
-    mirrored = facts.settings.use_glossy and facts.glossy
-    if facts.settings.bounces > 1 or mirrored:
+    seen = facts.settings.use_glossy and facts.glossy or facts.settings.use_translucency and facts.transmissive
+    if facts.settings.bounces > 1 or seen:
         return None
-    return "light bounces once, off what the lights see, and nothing mirrors the rest"
+    return "light bounces once, off what the lights see, and nothing shows the rest"
 
 
 class GeometryInjection(Pass):
@@ -302,7 +312,7 @@ class GeometryInjection(Pass):
     uniforms = (*_GRID, Uniform("axis", "int", "axis that the scene is drawn along"))
     shaders = {"main": {"compute": "engines/lpv/walls_comp.glsl"}}
     depends = ("transforms", "meshes", "materials")
-    settings = ("lpv.resolution", "lpv.occlusion", "bounces", "use_glossy")
+    settings = ("lpv.resolution", "lpv.occlusion", "bounces", "use_glossy", "use_translucency")
 
     def rate(self, facts: Facts) -> str:
         return "static"
@@ -487,23 +497,18 @@ class Propagation(Pass):
             frame.gl.ctx.memory_barrier(moderngl.SHADER_IMAGE_ACCESS_BARRIER_BIT)
 
 
-class IndirectLighting(Pass):
+class IndirectLighting(ScreenPass):
     """The volume looked up at each pixel."""
 
     title = "LPV Lighting Computation"
     figure = "LPV Lighting Computation"
     reads = ("lpv.volume", Optional("lpv.walls"), "gbuffer.depth", "gbuffer.normal")
-    writes = (
-        Texture("indirect.diffuse", "indirect_diffuse", "radiance a white Lambert surface would reflect, W/(m²·sr)",
-                "rgba32f", _screen, when=lambda f: None if f.diffuse else "no visible material is diffuse"),
-    )  # fmt: skip
+    writes = (INDIRECT_DIFFUSE,)
     uniforms = _GRID
-    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/lpv/lighting_frag.glsl"}}
+    fragment = "engines/lpv/lighting_frag.glsl"
 
-    def run(self, frame: Frame, planned: Planned) -> None:
-        program = frame.program(planned)
+    def prepare(self, frame: Frame, planned: Planned, program) -> None:
         _set_grid(frame, program, planned.facts)
-        frame.screen(planned, program)
 
 
 def _march_steps(facts: Facts) -> int:
@@ -511,7 +516,7 @@ def _march_steps(facts: Facts) -> int:
     return int(sum(grid(facts).size))
 
 
-class AmbientOcclusion(Pass):
+class AmbientOcclusion(ScreenPass):
     """Rays through the geometry volume."""
 
     title = "LPV AO Generation"
@@ -526,21 +531,20 @@ class AmbientOcclusion(Pass):
         Uniform("ao_directions", "int", "rays per pixel"),
         Uniform("ao_distance", "float", "how far an occluder counts, m"),
     )
-    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/lpv/ao_frag.glsl"}}
+    fragment = "engines/lpv/ao_frag.glsl"
 
     def defines(self, facts: Facts) -> dict[str, int]:
-        return {"MARCH_STEPS": _march_steps(facts), "MARCH_LIGHT": 0, "HAS_LPV_WALLS": 1}
+        return {"MARCH_STEPS": _march_steps(facts)}
 
     def absent(self, facts: Facts) -> str | None:
         return None if facts.settings.use_ao else "ambient occlusion is switched off"
 
-    def run(self, frame: Frame, planned: Planned) -> None:
-        program = frame.program(planned)
+    def prepare(self, frame: Frame, planned: Planned, program) -> None:
         ao = planned.facts.settings.ao
         _set_grid(frame, program, planned.facts, ao_directions=ao.samples, ao_distance=planned.facts.ao_distance)
-        frame.screen(planned, program)
 
 
+_RAY_SOURCE = "lamps' light from RSMs, bounces from the volume, hits from cells"
 _RAY_READS = (
     "occupancy", "rsm.depth", "rsm.normal", "rsm.albedo", "rsm.lights", "rsm.views", "lpv.volume", "lpv.walls", "lpv.albedo",
     "gbuffer.depth", "gbuffer.normal", Optional("gbuffer.diffuse"), Optional("direct.diffuse"), Optional("indirect.diffuse"),
@@ -557,53 +561,45 @@ def _set_ray(frame: Frame, program, facts: Facts, **more) -> None:
     _set_grid(frame, program, facts, rsm_light_count=len(facts.rig.sources), **more)
 
 
-class GlossyLighting(Pass):
+def _ray_defines(facts: Facts) -> dict[str, int]:
+    # raycast_lib can gather virtual lights; here are none.
+    return {"MESH_LIGHTS": 0, **medium_defines(facts)}
+
+
+class GlossyLighting(ScreenPass):
     """Rays of the glossy lobe to the surfaces they meet."""
 
     title = "LPV Glossy Computation"
     figure = "LPV Lighting Computation"
-    source = "lamps' light on what is mirrored from RSMs, bounces from the volume, hits from cells"
-    reads = (*_RAY_READS, "gbuffer.specular", "gbuffer.lobe", "brdf.energy", "brdf.average")
-    writes = (
-        Texture("indirect.glossy", "indirect_glossy", "radiance that the glossy lobe reflects, W/(m²·sr)", "rgba32f", _screen),
-    )
+    source = _RAY_SOURCE
+    reads = (*_RAY_READS, *LOBE)
+    writes = (INDIRECT_GLOSSY,)
     uniforms = (*_RAY_UNIFORMS, Uniform("glossy_rays", "int", "rays per pixel"))
-    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/lpv/glossy_frag.glsl"}}
+    fragment = "engines/lpv/glossy_frag.glsl"
 
     def defines(self, facts: Facts) -> dict[str, int]:
-        return {"MESH_LIGHTS": 0, **medium_defines(facts)}  # raycast_lib can gather virtual lights; here are none
+        return _ray_defines(facts)
 
     def absent(self, facts: Facts) -> str | None:
-        if not facts.settings.use_glossy:
-            return "glossy reflections are switched off"
-        return None if facts.glossy else "no visible material is glossy"
+        return no_gloss(facts)
 
-    def run(self, frame: Frame, planned: Planned) -> None:
-        program = frame.program(planned)
+    def prepare(self, frame: Frame, planned: Planned, program) -> None:
         _set_ray(frame, program, planned.facts, glossy_rays=planned.facts.settings.lpv.glossy_rays)
-        frame.screen(planned, program)
 
 
-class Refraction(Pass):
-    """A refracted ray per pixel through the volume."""
+class Refraction(ScreenPass):
+    """A refracted ray per pixel to the surface it meets."""
 
     title = "LPV Translucency"
     figure = "LPV Lighting Computation"
-    reads = (
-        "lpv.volume", "lpv.walls", "gbuffer.transmission", "translucent.depth", "translucent.normal",
-        "translucent.color", "translucent.medium", "translucent.back_depth", "translucent.back_normal",
-    )  # fmt: skip
-    writes = (
-        Texture("transmission.indirect", "transmission_indirect", "radiance through refracting surfaces, tinted; alpha 1 "
-                "where the ray met a wall", "rgba32f", _screen),
-    )  # fmt: skip
-    uniforms = _GRID
-    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/lpv/refraction_frag.glsl"}}
+    source = _RAY_SOURCE
+    reads = (*_RAY_READS, *REFRACTING)
+    writes = (TRANSMISSION_INDIRECT,)
+    uniforms = _RAY_UNIFORMS
+    fragment = "engines/lpv/refraction_frag.glsl"
 
     def defines(self, facts: Facts) -> dict[str, int]:
-        return {"MARCH_STEPS": _march_steps(facts), "MARCH_LIGHT": 1, "HAS_LPV_WALLS": 1}
+        return _ray_defines(facts)
 
-    def run(self, frame: Frame, planned: Planned) -> None:
-        program = frame.program(planned)
-        _set_grid(frame, program, planned.facts)
-        frame.screen(planned, program)
+    def prepare(self, frame: Frame, planned: Planned, program) -> None:
+        _set_ray(frame, program, planned.facts)

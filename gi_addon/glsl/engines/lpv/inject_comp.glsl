@@ -35,7 +35,11 @@ void main()
             t.flux /= 1.0 + facing * PI * sqr(light.patch_radius) * float(view.subframes);
         }
     }
-    ivec3 cell = cell_in_front((t.position_ws - grid_origin) / grid_cell, t.normal_ws, grid_size);
+    vec3 at = (t.position_ws - grid_origin) / grid_cell;
+    if (any(lessThan(at, vec3(-1.0))) || any(greaterThan(at, vec3(grid_size) + 1.0))) {
+        return; // a backdrop far outside (gi_addon/focus.py)
+    }
+    ivec3 cell = cell_in_front(at, t.normal_ws, grid_size);
     int base = cell_index(cell, grid_size) * SH_COUNT * 3;
     float y[SH_COUNT];
     sh_basis(t.normal_ws, y);

@@ -8,14 +8,13 @@
 // L_a is the neighbour upwind along axis a, κ_a the covered share of the face between. Each term is a flux per solid angle, so
 // that without surfaces flux is conserved exactly; an isotropic field in a closed black cavity is exact too.
 //
-// Walls at an angle to the grid. Their steps are more area than the wall (|n|₁ times), and would take and hide too much light.
-// With n turned to the cell's side, P = Σ max(ω_a n_a, 0) and M = Σ max(−ω_a n_a, 0) over the axes, a wall of area A shows the
-// ordinate A P of steps that face as it goes and A M of steps that it meets; in truth it sends A (P − M) where that is positive
-// (ω·n > 0, it leaves the wall) and takes A (M − P) where not. So of each step that light meets, the share min(1, P/M) takes
-// nothing and lets nothing through, and of each step behind, min(1, M/P) is no gap in what arrives: light comes past it from
-// where the other steps are in the grid, and air in truth. Neither counts as cross-section, so that the cell's radiance is its
-// flux over the rest:
-//     L = F/K,  F = Σ_a |ω_a| (1 − κ_a) L_a + Q/h²,  K = the smaller of Σ_behind and Σ_ahead of |ω_a| (1 − κ_a share_a).
+// Walls at an angle to the grid. Their steps are more area than the wall (|n|₁ times), and would take too much light. With n
+// turned to the cell's side, P = Σ max(ω_a n_a, 0) and M = Σ max(−ω_a n_a, 0) over the axes, a wall of area A has steps of
+// A P in the ordinate's back and of A M in its way, and sends A (P − M) of light where that is positive (ω·n ≥ 0). Then steps
+// in the way let nothing through and take nothing, and of those in the back the share M/P is no gap in what arrives, but air
+// between the steps. Where ω·n < 0 the steps in the back are all air. Neither counts as cross-section, so that the cell's
+// radiance is its flux over the rest:
+//     L = F/K,  F = Σ_a |ω_a| (1 − κ_a) L_a + Q/h²,  K = the smaller of Σ_behind and Σ_ahead of |ω_a| (1 − κ_a [as above]).
 // What goes on is L, or less where the open faces would pass more than F; the rest of F is absorbed. An isotropic field in
 // front of a wall of any direction then stays one. Alpha holds the share of L that goes on.
 //
@@ -28,7 +27,7 @@
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
-// min(1, M/P): of a step behind that light along w leaves, the share that is air. For a step ahead, −w.
+// min(1, M/P): the share of a step behind that is air.
 float step_share(vec3 w, vec3 n)
 {
     vec3 parts = w * n;
@@ -99,7 +98,7 @@ void main()
             float coverage = wall.x;
             if (coverage > 0.0) {
                 vec3 n = wall_normal(wall, axis) * (up[axis] ? -1.0 : 1.0);
-                ahead -= share[axis] * coverage * step_share(-w, n);
+                ahead -= dot(w, n) >= 0.0 ? share[axis] * coverage : 0.0;
                 open_ahead -= share[axis] * coverage;
             }
         }

@@ -28,14 +28,12 @@ void main()
         vec3 place = vec3(upper) + 0.5;
         place[axis] += wall.y - 1.0;
         ivec3 cell = cell_in_front(place, n, grid_size);
-        ivec3 taker = upper;
-        taker[axis] -= n[axis] < 0.0 ? 1 : 0;
         float y[SH_COUNT];
         sh_basis(n, y);
         vec3 irradiance = vec3(0.0);
         for (int c = 0; c < SH_COUNT; ++c) {
             // Y(−n): order 1 changes sign.
-            vec3 light = imageLoad(lpv_volume, taker + ivec3(0, 0, c * grid_size.z)).rgb;
+            vec3 light = imageLoad(lpv_volume, cell + ivec3(0, 0, c * grid_size.z)).rgb;
             irradiance += light * (PI * sh_cosine_share(c) * (c >= 1 && c <= 3 ? -y[c] : y[c]));
         }
         vec3 flux = albedo * max(irradiance, vec3(0.0)) * (wall.x * grid_cell * grid_cell);
