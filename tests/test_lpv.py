@@ -402,8 +402,8 @@ def test_a_pane_shows_the_lit_wall_behind_it(gl):
 
 
 def test_a_mirror_shows_the_unlit_wall_by_its_bounces(gl):
-    """The corner's wall, which no lamp lights: seen in a mirror it sends albedo × E/π of the lit floor's form factor, to 10 %. The
-    mirror hangs in the sun's direction, and the wall itself is not in the picture."""
+    """The corner's wall, which no lamp lights: seen in a mirror it sends albedo × E/π of the lit floor's form factor, to 10 %.
+    The mirror hangs in the sun's direction, and the wall itself is not in the picture."""
     scene = scenes.corner()
     b = scenes.SceneBuilder("mirrored-corner")
     for mesh, used in zip((scene.meshes[i] for i in scene.instances.mesh), scene.instances.materials, strict=True):

@@ -286,7 +286,8 @@ def fixed_point_groups(lights: np.ndarray, cell: float) -> list[tuple[float, set
 
 def _no_albedo(facts: Facts) -> str | None:
     """Why nobody asks for the walls' albedo."""
-    seen = facts.settings.use_glossy and facts.glossy or facts.settings.use_translucency and facts.transmissive
+    chosen = facts.settings
+    seen = (chosen.use_glossy and facts.glossy) or (chosen.use_translucency and facts.transmissive)
     if facts.settings.bounces > 1 or seen:
         return None
     return "light bounces once, off what the lights see, and nothing shows the rest"
