@@ -12,7 +12,7 @@ from . import presets
 from .effects import RESOURCES, source_of
 from .gl import shared
 from .host import comparison, status
-from .host.comparison import QUARTET_OT_compare
+from .host.comparison import QUARTET_OT_compare, QUARTET_OT_open_page
 from .host.operators import QUARTET_MT_presets, QUARTET_OT_add_preset, QUARTET_OT_preset, QUARTET_OT_split_view
 from .outputs import OUTPUTS
 from .settings import TECHNIQUES, Settings, walk
@@ -248,7 +248,7 @@ class QUARTET_PT_compare(_Panel, bpy.types.Panel):
         layout = self.layout
         window = context.window_manager.quartet
         column = self._column()
-        for name in ("reference", "reference_samples", "compare_percentage"):
+        for name in ("reference", "reference_samples", "compare_percentage", "open_page"):
             column.prop(window, name)
         row = layout.row()
         row.operator(QUARTET_OT_compare.bl_idname, icon="RENDER_STILL")
@@ -272,6 +272,7 @@ class QUARTET_PT_compare(_Panel, bpy.types.Panel):
             grid.label(text=name)
             for value in (score.gain, score.rel_mse, score.noise_floor, score.flip):
                 grid.label(text=f"{value:.3g}")
+        box.operator(QUARTET_OT_open_page.bl_idname, icon="URL")
         _say(box, "relMSE is the error beyond Cycles' own noise; gain is the ratio of all light")
 
 

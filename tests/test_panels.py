@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 import types
 
@@ -10,7 +11,8 @@ import numpy as np
 import pytest
 
 from gi_addon import presets
-from gi_addon.compare import exr, exr_plain, flip, scenes
+from gi_addon.compare import exr, exr_plain, flip, scenes, sheet
+from gi_addon.compare.page import number
 from gi_addon.effects import RESOURCES, source_of
 from gi_addon.engines import TECHNIQUES
 from gi_addon.settings import Settings, walk
@@ -173,11 +175,13 @@ def test_every_effect_names_its_source(technique):
 
 
 @pytest.mark.blender
-def test_compare_with_cycles_gives_numbers_and_pictures(context, gl, blender):
+def test_compare_with_cycles_gives_numbers_pictures_and_a_page(context, gl, blender, tmp_path, monkeypatch):
     """Another process renders both engines; the numbers are those of a lit box: direct light right within 5 % and far
-    better than a constant. Each view is an image of the right size."""
+    better than a constant. Each view is an image of the right size. The page holds scores, pictures, times and settings,
+    and fetches nothing."""
     from gi_addon.host import comparison
 
+    monkeypatch.setenv("QUARTET_CACHE", str(tmp_path))
     scene = context.scene
     scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 96, 54, 100
     scene.quartet.samples = 4
@@ -197,6 +201,44 @@ def test_compare_with_cycles_gives_numbers_and_pictures(context, gl, blender):
     image.pixels.foreach_get(shown)
     flips = outcome.pictures[window.compare_pass, "flip"]
     assert np.allclose(shown.reshape(27, 48, 4)[..., 0], flips, atol=1e-6)
+    assert outcome.page.parent == tmp_path / "reports"
+    text = outcome.page.read_text(encoding="utf-8")
+    for name, score in outcome.scores.items():
+        assert f"<td>{name}</td>" in text and number(score.rel_mse) in text
+    assert text.count("data:image/png;base64,") >= 4 * len(outcome.scores)
+    assert "<td class=text>samples</td><td class=text>4</td>" in text and "G-buffers Generation" in text and " ms</text>" in text
+    assert not re.search(r"""(src|href)=["']?(?!data:)\w""", text)
+
+
+@pytest.mark.blender
+def test_a_render_region_is_compared_alone(context, gl, blender, tmp_path, monkeypatch):
+    """A quarter of the picture: only its pixels count, black around them would thin every error out."""
+    from gi_addon.host import comparison
+
+    monkeypatch.setenv("QUARTET_CACHE", str(tmp_path))
+    render = context.scene.render
+    render.resolution_x, render.resolution_y, render.resolution_percentage = 96, 54, 100
+    render.use_border, render.use_crop_to_border = True, False
+    render.border_min_x, render.border_max_x, render.border_min_y, render.border_max_y = 0.25, 0.75, 0.5, 1.0
+    context.scene.quartet.samples = 1
+    window = blender.context.window_manager.quartet
+    window.reference, window.reference_samples, window.compare_percentage = "R1", 4, 100
+    assert blender.ops.quartet.compare() == {"FINISHED"}
+    reference = comparison.latest.pictures["Combined", "reference"]
+    assert reference.shape == (27, 48, 3)
+    assert 0.9 < comparison.latest.scores["Diffuse Direct"].gain < 1.1
+    assert (reference[:, [0, -1]].sum(axis=-1) > 0.0).mean() > 0.5
+    assert not render.use_crop_to_border
+
+
+def test_png_files_hold_every_pixel():
+    """Written by hand, read by an imaging library: the same bytes."""
+    import io
+
+    from PIL import Image
+
+    rgb = np.random.default_rng(3).integers(0, 256, (7, 13, 3), np.uint8)
+    assert np.array_equal(np.asarray(Image.open(io.BytesIO(sheet.png(rgb)))), rgb)
 
 
 @pytest.mark.blender

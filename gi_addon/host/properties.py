@@ -89,6 +89,10 @@ def _make_window() -> type:
             name="Pass", items=comparison.passes, update=_show, description="Pass of the comparison that is shown"
         ),
         "compare_view": bpy.props.EnumProperty(name="View", items=comparison.VIEWS, update=_show),
+        "open_page": bpy.props.BoolProperty(
+            name="Open Page", default=True,
+            description="Open the comparison's page in the web browser when it is done",
+        ),
         "cancel_compare": bpy.props.BoolProperty(name="Cancel", description="Give the comparison up"),
         "measure": bpy.props.BoolProperty(
             name="Measure Passes", default=False,
