@@ -99,10 +99,12 @@ def bench_command(scene, techniques, scale, frames, rows, limit, output) -> None
     elif scene.suffix.lower() == ".npz":
         plain, label = Scene.load(scene), scene.name
     else:
-        from .cli import _blender, _sync
+        from .cli import _blender
 
         with _blender(scene, None, None, (1280, 720), None, ()) as bscene:
-            (plain, _), label = _sync(bscene), scene.name
+            from .host import embedded
+
+            (plain, _), label = embedded.plain(bscene), scene.name
     scale = scale or (0.1 if shared().call(lambda gl: gl.software) else 1.0)
     calibration, timings = bench.bench(
         plain,
@@ -141,7 +143,7 @@ def report_command(
     scenes, techniques, sweep, peers, effects, references_folder, reference_samples, visits, output, options
 ) -> None:
     """Measure scenes with all candidates and write the report. ``options`` are the scene options of the command line."""
-    from .cli import _blender, _sync
+    from .cli import _blender
     from .compare import report, study
     from .compare.references import BOUNCES, ready, reference
     from .compare.sweeps import peer_sweep, technique_sweep
@@ -159,10 +161,10 @@ def report_command(
     for scene in scenes:
         arguments = (None, options["samples"], size, options["frame"], options["assignments"])
         with _blender(scene, *arguments) as bscene:
-            from .host import cycles, properties
+            from .host import cycles, embedded, properties
             from .host import peers as host_peers
 
-            plain, size = _sync(bscene)
+            plain, size = embedded.plain(bscene)
             key, base = plain.digest(), properties.read(bscene)
             label = scene.name
 
@@ -221,12 +223,11 @@ def report_command(
 
 def certify_command(scene: Path, bscene, reference_samples: int) -> None:
     """Print the certificate of a scene that is open in Blender."""
-    from .cli import _sync
     from .compare.certificate import certify
     from .compare.references import reference
-    from .host import cycles, properties
+    from .host import cycles, embedded, properties
 
-    plain, size = _sync(bscene)
+    plain, size = embedded.plain(bscene)
     settings = properties.read(bscene)
     kind = "R1" if settings.bounces <= 1 else "Rinf"
 
