@@ -54,7 +54,7 @@ class _Panel:
         return self.layout.column()
 
 
-def lines(text: str, width: int = 52) -> list[str]:
+def lines(text: str, width: int) -> list[str]:
     """``text`` in lines for labels, which Blender does not wrap."""
     out: list[str] = []
     for word in text.split():
@@ -65,9 +65,21 @@ def lines(text: str, width: int = 52) -> list[str]:
     return out
 
 
+# About: a letter of Blender's font and what else stands in a line of a panel, in pixels at scale 1.
+_LETTER, _AROUND = 6.5, 75
+
+
+def _letters() -> int:
+    """How many letters fit into a line of the region that is being drawn."""
+    region = bpy.context.region
+    if region is None or region.width <= 1:
+        return 52
+    return max(16, int((region.width / bpy.context.preferences.system.ui_scale - _AROUND) / _LETTER))
+
+
 def _say(layout, text: str, icon: str = "NONE") -> None:
     column = layout.column(align=True)
-    for number, line in enumerate(lines(text)):
+    for number, line in enumerate(lines(text, _letters())):
         column.label(text=line, icon=icon if number == 0 else "BLANK1" if icon != "NONE" else "NONE")
 
 
@@ -95,9 +107,10 @@ class QUARTET_PT_technique(_Panel, bpy.types.Panel):
 
     def draw(self, context):
         settings = context.scene.quartet
-        if status.problem:
+        _watch()
+        if status.problem():
             box = self.layout.box()
-            _say(box, status.problem, "ERROR")
+            _say(box, status.problem(), "ERROR")
         row = self.layout.row(align=True)
         for name, preset in presets.PRESETS.items():
             row.operator(QUARTET_OT_preset.bl_idname, text=preset.label).preset = name
@@ -338,6 +351,31 @@ class QUARTET_PT_world_distance(_Panel, bpy.types.Panel):
         self._column().prop(context.scene.world.light_settings, "distance")
 
 
+# --- redrawing --------------------------------------------------------------------------------------------------------
+
+# Frames end on other threads, which must not touch the interface: while the panels are in use a timer looks for news.
+_LOOK = 0.5  # seconds
+_seen = -1
+
+
+def _watch() -> None:
+    if not bpy.app.timers.is_registered(_look):
+        bpy.app.timers.register(_look, first_interval=_LOOK)
+
+
+def _look() -> float | None:
+    """Redraw the panels if there is something new to say; ends when no window shows the engine."""
+    global _seen
+    windows = [w for m in bpy.data.window_managers for w in m.windows if w.scene.render.engine == "QUARTET"]
+    if status.changes != _seen:
+        _seen = status.changes
+        for window in windows:
+            for area in window.screen.areas:
+                if area.type == "PROPERTIES":
+                    area.tag_redraw()
+    return _LOOK if windows else None
+
+
 _classes: list[type] = []
 
 
@@ -354,6 +392,8 @@ def register() -> None:
 
 
 def unregister() -> None:
+    if bpy.app.timers.is_registered(_look):
+        bpy.app.timers.unregister(_look)
     for cls in reversed(_classes):
         bpy.utils.unregister_class(cls)
     _classes.clear()

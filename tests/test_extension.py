@@ -72,7 +72,8 @@ def disabled():
     out["handlers"] = [f.__module__ for name in dir(bpy.app.handlers) for f in (getattr(bpy.app.handlers, name)
                        if isinstance(getattr(bpy.app.handlers, name), list) else ()) if "quartet" in f.__module__]
     viewport = sys.modules.get({module!r} + ".host.viewport")
-    out["timers"] = viewport is not None and bpy.app.timers.is_registered(viewport._tick)
+    ui = sys.modules.get({module!r} + ".ui")
+    out["timers"] = any(bpy.app.timers.is_registered(f) for f in (viewport and viewport._tick, ui and ui._look) if f)
     return out
 """
 
@@ -201,6 +202,40 @@ def test_installed_it_renders_in_the_window_and_leaves_nothing_behind(installed,
 
 
 @pytest.mark.realblender
+def test_without_opengl_the_window_says_so(tmp_path):
+    """Blender on Vulkan, and no OpenGL for Quartet at all: the panel, F12 and the driver check give the reason."""
+    answer = run_window(
+        """
+def steps():
+    from gi_addon.host import status
+    bpy.context.scene.render.engine = "QUARTET"
+    view()[1].shading.type = "RENDERED"
+    def told():
+        return bool(status.problem())
+    yield told
+    out = dict(viewport=status.problem())
+    try:
+        bpy.ops.quartet.check_driver()
+    except RuntimeError as error:
+        out["check"] = str(error)
+    ended = []
+    bpy.app.handlers.render_cancel.append(lambda *_: ended.append(True))
+    bpy.context.preferences.view.render_display_type = "NONE"
+    bpy.ops.render.render("INVOKE_DEFAULT")
+    def over():
+        return bool(ended)
+    yield over
+    report(**out, final=status.problems["final"])
+""",
+        tmp_path, "--gpu-backend", "vulkan", size="720x500",
+        __EGL_VENDOR_LIBRARY_FILENAMES="/nowhere", EGL_PLATFORM="none",
+    )  # fmt: skip
+    assert set(answer) == {"viewport", "check", "final"}
+    for text in answer.values():
+        assert "no OpenGL context on this machine" in text and "Install the graphics driver" in text
+
+
+@pytest.mark.realblender
 def test_an_old_driver_gets_a_message_where_the_user_looks(tmp_path):
     """OpenGL 4.2: the render fails with the reason, which the panel shows too, and nothing crashes."""
     answer = run(
@@ -211,7 +246,7 @@ try:
     said = ""
 except RuntimeError as error:
     said = str(error)
-report(said=said, panel=status.problem)
+report(said=said, panel=status.problem())
 gi_addon.unregister()
 """,
         tmp_path, "-b", MESA_GL_VERSION_OVERRIDE="4.2",

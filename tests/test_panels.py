@@ -95,12 +95,28 @@ def test_the_technique_panel_says_what_is_wrong(context):
     from gi_addon import ui
     from gi_addon.host import status
 
-    status.failed("there is no OpenGL on this machine")
+    status.failed("final", "there is no OpenGL on this machine")
     try:
         assert "there is no OpenGL on this machine" in " ".join(draw(ui.QUARTET_PT_technique, context).texts)
     finally:
-        status.resolved()
+        status.resolved("final")
     assert "no OpenGL" not in " ".join(draw(ui.QUARTET_PT_technique, context).texts)
+
+
+def test_a_viewport_that_goes_on_does_not_hide_why_a_render_failed():
+    """Each kind of picture has its own trouble; opening another file forgets all."""
+    from gi_addon.host import status
+
+    status.failed("final", "the camera has no lens")
+    status.failed("viewport", "the camera has no lens")
+    assert status.problem() == "the camera has no lens"
+    status.resolved("viewport")
+    assert status.problem() == "the camera has no lens"
+    status.resolved("final")
+    assert status.problem() == ""
+    status.failed("final", "out of memory")
+    status.forget()
+    assert status.problem() == "" and any("out of memory" in line for line in status.log_lines())
 
 
 @pytest.mark.blender

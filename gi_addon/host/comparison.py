@@ -218,8 +218,8 @@ def _compare(folder: Path, scene: str, reference: str, samples: int, percentage:
     render.engine = "QUARTET"
     bpy.context.window_manager.quartet.measure = True
     test = timed("Quartet")
-    if status.problem:
-        raise ComparisonError(f"Quartet rendered nothing: {status.problem}")
+    if status.problem():
+        raise ComparisonError(f"Quartet rendered nothing: {status.problem()}")
     tell(2, 0.5, "Scores")
     height, width = test["Combined"].shape[:2]
     label = "R∞ (32 bounces)" if reference == "Rinf" else "R1 (one bounce)"
