@@ -351,6 +351,19 @@ class QUARTET_PT_world_distance(_Panel, bpy.types.Panel):
         self._column().prop(context.scene.world.light_settings, "distance")
 
 
+def _render_menu(menu, context) -> None:
+    """The operators in the *Render* menu: there Blender's search (F3) finds them, and a right click gives them a key."""
+    if context.engine != "QUARTET":
+        return
+    layout = menu.layout
+    layout.separator()
+    layout.operator_context = "INVOKE_DEFAULT"
+    layout.operator(QUARTET_OT_compare.bl_idname, icon="RENDER_STILL")
+    layout.operator(QUARTET_OT_open_page.bl_idname, icon="URL")
+    layout.operator(QUARTET_OT_split_view.bl_idname, icon="WINDOW")
+    layout.operator_menu_enum(QUARTET_OT_preset.bl_idname, "preset", icon="PRESET")
+
+
 # --- redrawing --------------------------------------------------------------------------------------------------------
 
 # Frames end on other threads, which must not touch the interface: while the panels are in use a timer looks for news.
@@ -389,9 +402,11 @@ def register() -> None:
         if hasattr(cls, "COMPAT_ENGINES"):
             cls.COMPAT_ENGINES.add("QUARTET")
         bpy.utils.register_class(cls)
+    bpy.types.TOPBAR_MT_render.append(_render_menu)
 
 
 def unregister() -> None:
+    bpy.types.TOPBAR_MT_render.remove(_render_menu)
     if bpy.app.timers.is_registered(_look):
         bpy.app.timers.unregister(_look)
     for cls in reversed(_classes):

@@ -72,6 +72,7 @@ def disabled():
     out["handlers"] = [f.__module__ for name in dir(bpy.app.handlers) for f in (getattr(bpy.app.handlers, name)
                        if isinstance(getattr(bpy.app.handlers, name), list) else ()) if "quartet" in f.__module__]
     viewport = sys.modules.get({module!r} + ".host.viewport")
+    out["menu"] = [f.__module__ for f in bpy.types.TOPBAR_MT_render.draw._draw_funcs if "quartet" in f.__module__]
     ui = sys.modules.get({module!r} + ".ui")
     out["timers"] = any(bpy.app.timers.is_registered(f) for f in (viewport and viewport._tick, ui and ui._look) if f)
     return out
@@ -168,7 +169,7 @@ def _filled(script: str, folder: Path, path: Path | str = "") -> str:
 
 def _nothing_left(report: dict) -> bool:
     return report["properties"] == [False, False] and not any(
-        report[key] for key in ("engine", "classes", "operators", "panels", "threads", "handlers", "timers")
+        report[key] for key in ("engine", "classes", "operators", "panels", "threads", "handlers", "timers", "menu")
     )
 
 

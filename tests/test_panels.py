@@ -31,6 +31,12 @@ class Layout:
     def label(self, text="", **_):
         self.texts.append(text)
 
+    def separator(self, **_):
+        pass
+
+    def operator_menu_enum(self, name, _property, **_):
+        self.operators.append(name)
+
     def operator(self, name, **_):
         self.operators.append(name)
         return types.SimpleNamespace()
@@ -151,6 +157,55 @@ def test_standard_panels_work_for_the_engine(blender):
         "VIEWLAYER_PT_layer", "WORLD_PT_context_world", "RENDER_PT_frame_range",
     } <= names  # fmt: skip
     assert not {"VIEWLAYER_PT_layer_passes", "DATA_PT_light"} & names
+
+
+@pytest.mark.blender
+def test_everything_has_a_tooltip(blender):
+    """Every setting, every property of the panels and every operator of ours tells what it does."""
+    from gi_addon.host import properties
+
+    groups = [*properties._classes, *properties._window_class]
+    silent = [
+        f"{group.__name__}.{p.identifier}" for group in groups for p in group.bl_rna.properties
+        if p.type != "POINTER" and p.identifier not in ("name", "rna_type") and not p.description
+    ]  # fmt: skip
+    operators = [getattr(blender.ops.quartet, name).get_rna_type() for name in dir(blender.ops.quartet)]
+    silent += [operator.identifier for operator in operators if not operator.description]
+    assert len(groups) > 5 and len(operators) > 5 and not silent
+
+
+@pytest.mark.blender
+def test_the_operators_are_in_the_render_menu(blender, context):
+    """Where Blender's search finds them, for this engine only."""
+    from gi_addon import ui
+
+    assert ui._render_menu in blender.types.TOPBAR_MT_render.draw._draw_funcs
+    found = {}
+    for engine in ("QUARTET", "CYCLES"):
+        layout = Layout()
+        ui._render_menu(types.SimpleNamespace(layout=layout), types.SimpleNamespace(engine=engine))
+        found[engine] = layout.operators
+    assert found == {"QUARTET": ["quartet.compare", "quartet.open_page", "quartet.split_view", "quartet.preset"], "CYCLES": []}
+
+
+@pytest.mark.blender
+def test_the_users_presets_are_kept_and_applied(blender, context, tmp_path, monkeypatch):
+    """Blender's own preset menu: added by name, applied, removed."""
+    import bpy
+
+    def resource(kind, path="", create=False):
+        (tmp_path / path).mkdir(parents=True, exist_ok=True)
+        return str(tmp_path / path)
+
+    monkeypatch.setattr(bpy.utils, "user_resource", resource)
+    monkeypatch.setattr(bpy.utils, "is_path_extension", lambda path: False, raising=False)
+    settings = bpy.context.scene.quartet
+    settings.samples, settings.rsm.samples = 7, 77
+    assert bpy.ops.quartet.add_preset(name="Mine") == {"FINISHED"}
+    (path,) = tmp_path.rglob("*.py")
+    settings.samples, settings.rsm.samples = 1, 10
+    assert bpy.ops.script.execute_preset(filepath=str(path), menu_idname="QUARTET_MT_presets") == {"FINISHED"}
+    assert (settings.samples, settings.rsm.samples) == (7, 77)
 
 
 @pytest.mark.blender
