@@ -45,7 +45,7 @@ def dots(rows: Sequence[tuple[str, Mapping[str, float]]], colors: Mapping[str, s
     for decade in range(low, high + 1):
         x = place(10.0**decade)
         body.append(
-            f'<line x1="{x:.1f}" x2="{x:.1f}" y1="{2 * _TOP}" y2="{bottom}" stroke="#d8d8d8"/>'
+            f'<line x1="{x:.1f}" x2="{x:.1f}" y1="{2 * _TOP}" y2="{bottom}" stroke="currentColor" opacity="0.2"/>'
             + _text(x, 2 * _TOP - 6, f"{10.0**decade:g}", "middle")
         )
     x = float(_LABEL)
@@ -66,7 +66,7 @@ def dots(rows: Sequence[tuple[str, Mapping[str, float]]], colors: Mapping[str, s
 
 
 def _text(x: float, y: float, text: str, anchor: str = "start") -> str:
-    return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}">{esc(text)}</text>'
+    return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" fill="currentColor">{esc(text)}</text>'
 
 
 def _svg(height: float, body: Sequence[str]) -> str:
