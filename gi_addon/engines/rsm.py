@@ -19,6 +19,7 @@ from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentL
 from ..passes.lights import LightList, RSMGeneration, ShadowMaps
 from ..passes.occupancy import CELL_UNIFORMS, Occupancy, set_cells
 from ..passes.resolve import Resolve
+from ..passes.subsurface import Subsurface, SubsurfaceBack
 from ..passes.surface_points import SETS, SurfacePoints, points_per_subframe
 from ..passes.volumetric import MEDIUM_UNIFORMS, Volumetric, medium_defines, set_medium
 from ..passes.world_guide import WorldGuide
@@ -47,9 +48,10 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         AOBlur(),
         InterpolatedIndirect(settings),
         IndirectLighting(settings),
-        Subsurface(),
         WorldRays(),
         DirectLighting(),
+        SubsurfaceBack(),
+        Subsurface(),
         TranslucentLighting(),
         GlossyReflections(),
         Refraction(),
@@ -324,32 +326,4 @@ class Refraction(Pass):
     def run(self, frame: Frame, planned: Planned) -> None:
         program = frame.program(planned)
         _set_ray(frame, program, planned.facts)
-        frame.screen(planned, program)
-
-
-class Subsurface(Pass):
-    """Light scattered below surfaces, from where it entered: the RSM's depth as a translucent shadow map."""
-
-    title = "RSM Subsurface Scattering"
-    reads = (
-        "rsm.depth", "rsm.normal", "rsm.albedo", "rsm.lights", "rsm.views", "gbuffer.depth", "gbuffer.diffuse",
-        "gbuffer.subsurface",
-    )  # fmt: skip
-    writes = (
-        Texture("direct.subsurface", "direct_subsurface", "radiance as direct.diffuse, of light that entered around the "
-                "point; share of the diffuse albedo it is for", "rgba32f", _screen),
-    )  # fmt: skip
-    uniforms = (*MEDIUM_UNIFORMS, Uniform("rsm_light_count", "int", "lights with reflective shadow maps"))
-    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/rsm/subsurface_frag.glsl"}}
-
-    def defines(self, facts: Facts) -> dict[str, int]:
-        return medium_defines(facts)
-
-    def absent(self, facts: Facts) -> str | None:
-        return None if facts.settings.use_translucency else "translucency is switched off"
-
-    def run(self, frame: Frame, planned: Planned) -> None:
-        program = frame.program(planned)
-        set_medium(frame, program, planned.facts)
-        frame.set(program, rsm_light_count=len(planned.facts.rig.sources))
         frame.screen(planned, program)

@@ -19,7 +19,6 @@ class DirectLighting(Pass):
         Optional("shadow.cones"), "gbuffer.depth", "gbuffer.normal",
         Optional("gbuffer.specular", ("direct.glossy",)), Optional("gbuffer.lobe", ("direct.glossy",)),
         Optional("brdf.energy", ("direct.glossy",)), Optional("brdf.average", ("direct.glossy",)),
-        Optional("direct.subsurface", ("direct.diffuse",)),
         Optional("screen.light", ("direct.diffuse",)), Optional("world.difference", ("direct.diffuse",)),
     )  # fmt: skip
     writes = (
