@@ -15,10 +15,18 @@ from ..graph import Buffer, Optional, Pass, Planned, Texture, Uniform
 from ..passes.ao import AOBlur, AOGeneration
 from ..passes.brdf_tables import BRDFTables
 from ..passes.direct_lighting import DirectLighting, TranslucentLighting
-from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint, _screen, gather_size
+from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint, gather_size
 from ..passes.lights import LightList, RSMGeneration, ShadowMaps
 from ..passes.occupancy import CELL_UNIFORMS, Occupancy, set_cells
 from ..passes.resolve import Resolve
+from ..passes.screen import (
+    INDIRECT_DIFFUSE,
+    INDIRECT_GLOSSY,
+    LOBE,
+    REFRACTING,
+    TRANSMISSION_INDIRECT,
+    ScreenPass,
+)
 from ..passes.subsurface import Subsurface, SubsurfaceBack
 from ..passes.surface_points import SETS, SurfacePoints, points_per_subframe
 from ..passes.volumetric import MEDIUM_UNIFORMS, Volumetric, medium_defines, set_medium
@@ -198,7 +206,7 @@ def _tested(reads: tuple, settings: Settings) -> tuple:
     return reads if settings.rsm.visibility == "NONE" else (Optional("occupancy"), *reads)
 
 
-class InterpolatedIndirect(Pass):
+class InterpolatedIndirect(ScreenPass):
     """Indirect irradiance at one pixel per block."""
 
     title = "RSM Interpolated Indirect Lighting Computation"
@@ -211,7 +219,7 @@ class InterpolatedIndirect(Pass):
                 "rgba32f", gather_size, scratch=True),
     )  # fmt: skip
     uniforms = (Uniform("vpl_count", "int", "virtual point lights in the list"), *CELL_UNIFORMS, *MEDIUM_UNIFORMS)
-    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/rsm/gather_low_frag.glsl"}}
+    fragment = "engines/rsm/gather_low_frag.glsl"
 
     def __init__(self, settings: Settings) -> None:
         self.reads = _tested(type(self).reads, settings)
@@ -222,15 +230,13 @@ class InterpolatedIndirect(Pass):
     def absent(self, facts: Facts) -> str | None:
         return None if facts.settings.gather_scale > 1 else "every pixel gathers for itself"
 
-    def run(self, frame: Frame, planned: Planned) -> None:
-        program = frame.program(planned)
+    def prepare(self, frame: Frame, planned: Planned, program) -> None:
         frame.set(program, vpl_count=vpl_count(planned.facts))
         set_cells(frame, program, planned.facts)
         set_medium(frame, program, planned.facts)
-        frame.screen(planned, program)
 
 
-class IndirectLighting(Pass):
+class IndirectLighting(ScreenPass):
     """Indirect light of every pixel: interpolated where the low resolution has its surface, gathered where not."""
 
     title = "RSM Lighting Computation"
@@ -240,12 +246,9 @@ class IndirectLighting(Pass):
         Optional("gbuffer.low_normal"), Optional("gbuffer.low_pixel"), Optional("indirect.low"),
         Optional("indirect.low_direction"), Optional("ao"),
     )  # fmt: skip
-    writes = (
-        Texture("indirect.diffuse", "indirect_diffuse", "radiance a white Lambert surface would reflect, W/(m²·sr)",
-                "rgba32f", _screen, when=lambda f: None if f.diffuse else "no visible material is diffuse"),
-    )  # fmt: skip
+    writes = (INDIRECT_DIFFUSE,)
     uniforms = (Uniform("vpl_count", "int", "virtual point lights in the list"), *CELL_UNIFORMS, *MEDIUM_UNIFORMS)
-    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/rsm/lighting_frag.glsl"}}
+    fragment = "engines/rsm/lighting_frag.glsl"
 
     def __init__(self, settings: Settings) -> None:
         self.reads = _tested(type(self).reads, settings)
@@ -253,12 +256,10 @@ class IndirectLighting(Pass):
     def defines(self, facts: Facts) -> dict[str, int]:
         return _gather_defines(facts)
 
-    def run(self, frame: Frame, planned: Planned) -> None:
-        program = frame.program(planned)
+    def prepare(self, frame: Frame, planned: Planned, program) -> None:
         frame.set(program, vpl_count=vpl_count(planned.facts))
         set_cells(frame, program, planned.facts)
         set_medium(frame, program, planned.facts)
-        frame.screen(planned, program)
 
 
 _RAY_READS = (
@@ -280,17 +281,15 @@ def _set_ray(frame: Frame, program, facts: Facts) -> None:
     frame.set(program, rsm_light_count=len(facts.rig.sources), vpl_count=vpl_count(facts))
 
 
-class GlossyReflections(Pass):
+class GlossyReflections(ScreenPass):
     """What glossy surfaces mirror of lit surfaces: a ray per pixel, cast in the RSMs."""
 
     title = "RSM Glossy Reflections"
     figure = "Ray Casting in RSM"
-    reads = (*_RAY_READS, "gbuffer.specular", "gbuffer.lobe", "brdf.energy", "brdf.average")
-    writes = (
-        Texture("indirect.glossy", "indirect_glossy", "radiance reflected by the glossy lobe, W/(m²·sr)", "rgba32f", _screen),
-    )  # fmt: skip
+    reads = (*_RAY_READS, *LOBE)
+    writes = (INDIRECT_GLOSSY,)
     uniforms = _RAY_UNIFORMS
-    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/rsm/glossy_frag.glsl"}}
+    fragment = "engines/rsm/glossy_frag.glsl"
 
     def defines(self, facts: Facts) -> dict[str, int]:
         return _gather_defines(facts, always=True)
@@ -298,32 +297,22 @@ class GlossyReflections(Pass):
     def absent(self, facts: Facts) -> str | None:
         return None if facts.settings.use_glossy else "glossy reflections are switched off"
 
-    def run(self, frame: Frame, planned: Planned) -> None:
-        program = frame.program(planned)
+    def prepare(self, frame: Frame, planned: Planned, program) -> None:
         _set_ray(frame, program, planned.facts)
-        frame.screen(planned, program)
 
 
-class Refraction(Pass):
+class Refraction(ScreenPass):
     """What is seen through refracting surfaces: a refracted ray per pixel, cast in the RSMs, which hold no such surface."""
 
     title = "RSM Translucency"
     figure = "Ray Casting in RSM"
-    reads = (
-        *_RAY_READS, "gbuffer.transmission", "translucent.depth", "translucent.normal",
-        "translucent.color", "translucent.medium", "translucent.back_depth", "translucent.back_normal",
-    )  # fmt: skip
-    writes = (
-        Texture("transmission.indirect", "transmission_indirect", "radiance through refracting surfaces, tinted; alpha 1 "
-                "where the ray found something", "rgba32f", _screen),
-    )  # fmt: skip
+    reads = (*_RAY_READS, *REFRACTING)
+    writes = (TRANSMISSION_INDIRECT,)
     uniforms = _RAY_UNIFORMS
-    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/rsm/refraction_frag.glsl"}}
+    fragment = "engines/rsm/refraction_frag.glsl"
 
     def defines(self, facts: Facts) -> dict[str, int]:
         return _gather_defines(facts, always=True)
 
-    def run(self, frame: Frame, planned: Planned) -> None:
-        program = frame.program(planned)
+    def prepare(self, frame: Frame, planned: Planned, program) -> None:
         _set_ray(frame, program, planned.facts)
-        frame.screen(planned, program)

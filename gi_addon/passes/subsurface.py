@@ -10,7 +10,7 @@ from ..facts import Facts
 from ..frame import Frame
 from ..graph import Optional, Pass, Planned, Texture, Uniform
 from ..scene import CAMERA
-from .gbuffer import _screen
+from .screen import ScreenPass, _screen
 from .volumetric import MEDIUM_UNIFORMS, medium_defines, set_medium
 
 
@@ -58,14 +58,13 @@ class SubsurfaceBack(Pass):
         frame.gl.ctx.depth_func = "<"
 
 
-class Subsurface(Pass):
+class Subsurface(ScreenPass):
     """Light that entered elsewhere and leaves here."""
 
     title = "Subsurface Scattering"
     reads = (
         "subsurface.back", "gbuffer.depth", "gbuffer.normal", "gbuffer.diffuse", "gbuffer.subsurface",
-        Optional("gbuffer.specular"), Optional("gbuffer.lobe"),
-        Optional("direct.diffuse", ("subsurface.direct",)), Optional("indirect.diffuse", ("subsurface.indirect",)),
+        "gbuffer.entry", Optional("direct.diffuse", ("subsurface.direct",)), Optional("indirect.diffuse", ("subsurface.indirect",)),
         *(Optional(f"rsm.{name}") for name in ("depth", "normal", "albedo", "lights", "views")),
     )  # fmt: skip
     writes = (
@@ -74,7 +73,7 @@ class Subsurface(Pass):
         Texture("subsurface.indirect", "subsurface_indirect", "the same of indirect.diffuse", "rgba32f", _screen),
     )  # fmt: skip
     uniforms = (*MEDIUM_UNIFORMS, Uniform("rsm_light_count", "int", "lights with reflective shadow maps"))
-    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "passes/subsurface_frag.glsl"}}
+    fragment = "passes/subsurface_frag.glsl"
 
     def defines(self, facts: Facts) -> dict[str, int]:
         return medium_defines(facts)
@@ -82,8 +81,6 @@ class Subsurface(Pass):
     def absent(self, facts: Facts) -> str | None:
         return _off(facts)
 
-    def run(self, frame: Frame, planned: Planned) -> None:
-        program = frame.program(planned)
+    def prepare(self, frame: Frame, planned: Planned, program) -> None:
         set_medium(frame, program, planned.facts)
         frame.set(program, rsm_light_count=len(planned.facts.rig.sources))
-        frame.screen(planned, program)

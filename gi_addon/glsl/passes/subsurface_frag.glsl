@@ -3,9 +3,9 @@
 // of the object: the near side that the picture shows, its far side along the pixel, and the side that the lights' maps
 // show, which are translucent shadow maps then (C. Dachsbacher and M. Stamminger, EGSR 2003).
 //
-// A walk starts inwards by the cosine, goes free paths of mean ℓ (Cycles' radius) and turns any way, and keeps the share α of
-// its light at each turn; where it leaves, it takes that place's E/π. A half space returns the albedo A, by which Cycles
-// divides its pass, and so is this divided: under even light flat ground shines as if nothing went below.
+// A walk goes in by the eye's ray, refracted by a rough surface, goes free paths of mean ℓ (Cycles' radius) and turns any way,
+// and keeps the share α of its light at each turn; where it leaves, it takes that place's E/π. A half space lit from all sides
+// returns the albedo A, by which Cycles divides its pass, and so is this divided.
 //
 // Deep inside (more than DEEP free paths from all known sides) light diffuses, and a walk leaves the largest empty sphere of
 // radius ρ anywhere on it, with the share κρ/sinh(κρ) (M. Muller, "Some Continuous Monte Carlo Methods for the Dirichlet
@@ -28,7 +28,6 @@ const int HALVINGS = 4;    // of the step that leaves
 const float DEEP = 4.0;    // free paths
 const float EMPTY = 0.75;  // of the distance to the nearest known side
 const float FAR = 1e30;
-const float SUBSURFACE_IOR = 1.0; // where no glossy layer says: Blender's default
 
 // A number in [0, 1), and the next state.
 float draw(inout uint state)
@@ -132,15 +131,9 @@ void main()
         mat3 frame = frame_from_normal(n);
         vec3 v = view_direction_ws(uv) * frame;
         v = normalize(vec3(v.xy, max(v.z, 1e-3)));
-        float eta = SUBSURFACE_IOR;
-        float rough = 1.0;
-#if HAS_GBUF_LOBE
-        vec4 specular = texelFetch(gbuf_specular, pixel, 0);
-        if (max3(specular.rgb) > 0.0) {
-            eta = max(texelFetch(gbuf_lobe, pixel, 0).r, 1.0);
-            rough = max(sqr(specular.a), ALPHA_MIN);
-        }
-#endif
+        vec2 entry = texelFetch(gbuf_entry, pixel, 0).rg;
+        float rough = max(sqr(entry.x), ALPHA_MIN);
+        float eta = entry.y;
         vec3 surface_albedo = clamp(texelFetch(gbuf_diffuse, pixel, 0).rgb, vec3(1e-3), vec3(1.0));
         vec3 alpha = vec3(single_scattering_albedo(surface_albedo.r), single_scattering_albedo(surface_albedo.g),
                           single_scattering_albedo(surface_albedo.b));
