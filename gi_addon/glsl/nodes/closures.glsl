@@ -35,15 +35,8 @@ Closure principled_closure(vec3 base, float metallic, float roughness, float ior
     level = max(level, 0.0);
     vec3 metal_f0 = saturate(base);
 
-    // "Specular IOR Level" scales F0; ½ leaves the index alone.
-    float f0 = f0_from_ior(ior);
-    float eta = ior;
-    if (level != 0.5) {
-        f0 *= 2.0 * level;
-        eta = ior_from_f0(f0);
-    } else if (eta < 1.0) {
-        eta = 1.0 / eta; // seen from outside a thinner medium: same F0, no total reflection in the table
-    }
+    float f0 = f0_from_ior(ior) * 2.0 * level;
+    float eta = principled_ior(ior, level); // seen from outside a thinner medium: same F0, no total reflection in the table
     vec3 layer_f0 = saturate(f0 * max(tint, vec3(0.0)));
     bool has_layer = eta > 1.0;
     vec3 layer_albedo =

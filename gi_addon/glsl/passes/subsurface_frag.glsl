@@ -221,7 +221,7 @@ void main()
                 }
 #endif
                 weight /= surface_albedo * float(WALKS);
-                if (at.pixel.x >= 0 && (beyond.near < 0.0 || (at.near <= doubt && at.near < at.far))) {
+                if (at.pixel.x >= 0 && (beyond.near < 0.0 || (at.near <= min(doubt, at.far) && beyond.far >= 0.0))) {
 #if HAS_DIRECT_DIFFUSE
                     direct += weight * texelFetch(direct_diffuse, at.pixel, 0).rgb;
 #endif
