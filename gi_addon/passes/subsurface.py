@@ -27,6 +27,8 @@ class SubsurfaceBack(Pass):
         Texture("subsurface.back", "subsurface_back", "view depth of the farthest surface that light scatters below, world "
                 "units; 0 where there is none", "r32f", _screen,
                 when=lambda f: None if f.subsurface else "no visible material scatters below its surface"),
+        Texture("subsurface.back_normal", "subsurface_back_normal", "its triangle's normal, towards the eye, world space, "
+                "octahedral", "rg16", _screen),
         Texture("subsurface.back_z", "subsurface_back_z", "depth buffer", "depth24", _screen, scratch=True),
     )  # fmt: skip
 
@@ -63,8 +65,9 @@ class Subsurface(ScreenPass):
 
     title = "Subsurface Scattering"
     reads = (
-        "subsurface.back", "gbuffer.depth", "gbuffer.normal", "gbuffer.diffuse", "gbuffer.subsurface",
-        "gbuffer.entry", Optional("direct.diffuse", ("subsurface.direct",)), Optional("indirect.diffuse", ("subsurface.indirect",)),
+        "subsurface.back", "subsurface.back_normal", "gbuffer.depth", "gbuffer.normal", "gbuffer.diffuse",
+        "gbuffer.subsurface", "gbuffer.entry",
+        Optional("direct.diffuse", ("subsurface.direct",)), Optional("indirect.diffuse", ("subsurface.indirect",)),
         *(Optional(f"rsm.{name}") for name in ("depth", "normal", "albedo", "lights", "views")),
     )  # fmt: skip
     writes = (

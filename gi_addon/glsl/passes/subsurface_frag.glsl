@@ -22,7 +22,7 @@
 #include "engines/rsm/rsm_lib.glsl"
 #endif
 
-const int WALKS = 6;       // a sub-frame's; two for each channel
+const int WALKS = 6;       // a sub-frame's; one for each channel
 const int STEPS = 64;      // what is under way after these is lost
 const int HALVINGS = 4;    // of the step that leaves
 const float DEEP = 4.0;    // free paths
@@ -62,6 +62,13 @@ Inside inside_at(vec3 offset, vec3 start_ws, ivec2 start, int light)
     ivec2 pixel = ivec2(clamp(floor(s.xy * view.resolution), vec2(0.0), view.resolution - 1.0));
     if (s.z > view.clip_start) {
         float back = texelFetch(subsurface_back, pixel, 0).r;
+        // The planes of the object's last pixels say better where it ends than pixels do.
+        ivec2 inwards = pixel + sign(start - pixel);
+        if (back <= 0.0 && texelFetch(subsurface_back, inwards, 0).r > 0.0) {
+            pixel = inwards;
+            back = texelFetch(subsurface_back, pixel, 0).r;
+        }
+        vec2 uv = (vec2(pixel) + 0.5) * view.inverse_resolution;
         float depth = texelFetch(gbuf_depth, pixel, 0).r;
         vec3 ng = octahedral_decode(texelFetch(gbuf_normal, pixel, 0).zw);
         if (back <= 0.0) {
@@ -70,13 +77,13 @@ Inside inside_at(vec3 offset, vec3 start_ws, ivec2 start, int light)
             r.near = -dot(offset, ng); // free of the rounding of places
             r.pixel = pixel;
         } else if (texelFetch(gbuf_subsurface, pixel, 0).a > 0.0) {
-            vec3 shown_ws = position_ws_from_depth((vec2(pixel) + 0.5) * view.inverse_resolution, depth);
-            r.near = dot(shown_ws - p, ng);
+            r.near = dot(position_ws_from_depth(uv, depth) - p, ng);
             r.pixel = pixel;
         }
         // An open surface has no far side.
-        if (back > depth * (1.0 + 1e-5) || r.pixel.x < 0) {
-            r.far = min(r.far, back - s.z);
+        if (back > 0.0 && (back > depth * (1.0 + 1e-5) || r.pixel.x < 0)) {
+            vec3 back_ng = octahedral_decode(texelFetch(subsurface_back_normal, pixel, 0).rg);
+            r.far = dot(p - position_ws_from_depth(uv, back), back_ng);
         }
     }
 #if HAS_RSM_DEPTH
@@ -212,12 +219,12 @@ void main()
                 // Which side that is, whatever light was chosen: the picture shows it with all of them.
                 Inside at = inside_at(before, position_ws, pixel, light);
                 Inside beyond = inside_at(after, position_ws, pixel, light);
-                float doubt = 0.0;
                 vec3 y = position_ws + before;
+                float doubt = pixel_width(view_depth(y));
 #if HAS_RSM_DEPTH
                 if (at.view >= 0) {
                     LightView from = rsm_views[at.view];
-                    doubt = light_view_texel_width(from, dot(y - from.origin_ws, from.axis_z));
+                    doubt += light_view_texel_width(from, dot(y - from.origin_ws, from.axis_z));
                 }
 #endif
                 weight /= surface_albedo * float(WALKS);
@@ -230,7 +237,7 @@ void main()
 #endif
                 } else {
 #if HAS_RSM_DEPTH
-                    if (at.view >= 0 && beyond.lit < 0.0) {
+                    if (at.view >= 0 && (beyond.lit < 0.0 || at.lit <= doubt)) {
                         vec3 l;
                         float angle;
                         Light from = rsm_lights[light];
