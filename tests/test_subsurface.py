@@ -105,7 +105,7 @@ def test_every_technique_with_light_maps_lights_wax_from_behind(gl, technique):
 
 @pytest.mark.blender
 def test_a_ball_lit_from_behind_is_that_of_cycles(blender, gl):
-    """Gain within 10 % and error below a fifth of that without, both with what is seen of the ball alone."""
+    """Well inside its outline: gain within 12 %, where nine tenths of the light came through."""
     from gi_addon.compare.metrics import rel_mse
     from gi_addon.host.build import build
     from gi_addon.host.cycles import Reference, render_passes, set_up
@@ -113,16 +113,22 @@ def test_a_ball_lit_from_behind_is_that_of_cycles(blender, gl):
     b = scenes.SceneBuilder()
     b.add(scenes.sphere(0.45, 32, 16), wax((0.2, 0.15, 0.1), Specular_IOR_Level=0.5, Roughness=1.0))
     b.light(scenes.spot_light((0.4, 2.5, 1.5), (0, 0, 0), 600.0, size=0.6, radius=0.05))
-    scene, size = b.build(scenes.perspective((0, -2.5, 0.4), (0, 0, 0), 0.75)), (32, 18)
+    scene, size = b.build(scenes.perspective((0, -2.5, 0.4), (0, 0, 0), 0.75)), (64, 36)
     halves = []
     for seed in (1, 2):
         there = build(scene)
         there.render.resolution_x, there.render.resolution_y, there.render.resolution_percentage = *size, 100
-        set_up(there, Reference(1, 256, seed))
-        halves.append(render_passes(there, ("Diffuse Direct",))["Diffuse Direct"][..., :3][5:13, 12:20])
+        set_up(there, Reference(1, 96, seed))
+        halves.append(render_passes(there, ("Diffuse Direct",))["Diffuse Direct"][..., :3][10:26, 24:40])
     tests = {
-        on: make(scene, "Diffuse Direct", samples=48, resolution=size, use_translucency=on).passes["Diffuse Direct"][5:13, 12:20]
+        on: make(scene, "Diffuse Direct", samples=24, resolution=size, use_translucency=on).passes["Diffuse Direct"][10:26, 24:40]
         for on in (True, False)
     }
-    assert tests[True].sum() / (halves[0] + halves[1]).sum() * 2.0 == pytest.approx(1.0, abs=0.1)
-    assert rel_mse(tests[True], *halves) < 0.2 * rel_mse(tests[False], *halves)
+    gain = 2.0 * tests[True].sum() / (halves[0] + halves[1]).sum()
+    dark = tests[False].sum() / tests[True].sum()
+    assert gain == pytest.approx(1.0, abs=0.12) and dark < 0.1, (gain, dark)
+
+    def blocks(image):  # means of 8 × 8 pixels: single ones are noise in both
+        return image.reshape(2, 8, 2, 8, 3).mean(axis=(1, 3))
+
+    assert rel_mse(*map(blocks, (tests[True], *halves))) < 0.05

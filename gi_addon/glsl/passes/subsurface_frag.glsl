@@ -22,7 +22,7 @@
 #include "engines/rsm/rsm_lib.glsl"
 #endif
 
-const int WALKS = 6;       // a sub-frame's; one for each channel
+const int WALKS = 3;       // a sub-frame's; one for each channel
 const int STEPS = 64;      // what is under way after these is lost
 const int HALVINGS = 4;    // of the step that leaves
 const float DEEP = 4.0;    // free paths
@@ -62,12 +62,6 @@ Inside inside_at(vec3 offset, vec3 start_ws, ivec2 start, int light)
     ivec2 pixel = ivec2(clamp(floor(s.xy * view.resolution), vec2(0.0), view.resolution - 1.0));
     if (s.z > view.clip_start) {
         float back = texelFetch(subsurface_back, pixel, 0).r;
-        // The planes of the object's last pixels say better where it ends than pixels do.
-        ivec2 inwards = pixel + sign(start - pixel);
-        if (back <= 0.0 && texelFetch(subsurface_back, inwards, 0).r > 0.0) {
-            pixel = inwards;
-            back = texelFetch(subsurface_back, pixel, 0).r;
-        }
         vec2 uv = (vec2(pixel) + 0.5) * view.inverse_resolution;
         float depth = texelFetch(gbuf_depth, pixel, 0).r;
         vec3 ng = octahedral_decode(texelFetch(gbuf_normal, pixel, 0).zw);
@@ -237,7 +231,7 @@ void main()
 #endif
                 } else {
 #if HAS_RSM_DEPTH
-                    if (at.view >= 0 && (beyond.lit < 0.0 || at.lit <= doubt)) {
+                    if (at.view >= 0 && beyond.lit < 0.0) {
                         vec3 l;
                         float angle;
                         Light from = rsm_lights[light];
