@@ -171,16 +171,20 @@ def inspect_command(
 @click.option("--sweep", type=click.Choice(("none", "samples", "quick", "full")),
               help="How many settings of each technique to try.")
 @click.option("--peers", default="", help="Rivals in the same run: cycles, eevee, or both separated by a comma.")
+@click.option("--blender", metavar="PROGRAM",
+              help="The Blender that EEVEE runs in; $QUARTET_BLENDER or 'blender' on the path if none is given.")
 @click.option("--effects", is_flag=True, help="The paper's Table 1 with numbers, on scenes made for each effect.")
 @click.option("--references", "references_folder", type=click.Path(path_type=Path, exists=True, file_okay=False),
               help="Folder of ready references, SCENE.npz; scenes that it lacks are rendered with Cycles.")
 @click.option("--reference-samples", default=256, show_default=True, help="Cycles samples per half.")
 @click.option("--visits", type=click.IntRange(1, 2), default=2, show_default=True,
               help="1 measures each candidate once; 2 goes there and back, so that a machine's drift shows.")
+@click.option("--budget", type=click.FloatRange(0.0), default=60.0, show_default=True,
+              help="Seconds of timed frames per candidate and visit: slow ones get fewer frames, as the report says.")
 @click.option("-o", "--output", type=click.Path(path_type=Path), default=Path("quartet-compare"), show_default=True,
               help="Folder for the report, sheets and results.json.")
 def compare_command(
-    scenes, techniques, sweep, peers, effects, references_folder, reference_samples, visits, output, **options
+    scenes, techniques, sweep, peers, blender, effects, references_folder, reference_samples, visits, budget, output, **options
 ) -> None:
     """Render SCENES with Quartet and with unbiased Cycles (R1 and R∞, cached) and state the error per pass.
 
@@ -191,7 +195,8 @@ def compare_command(
         raise click.UsageError("name a scene file, builtin:NAME, or --effects")
     if effects or len(scenes) > 1 or techniques or sweep or peers or references_folder:
         report_command(
-            scenes, techniques, sweep or "none", peers, effects, references_folder, reference_samples, visits, output, options
+            scenes, techniques, sweep or "none", peers, blender, effects, references_folder, reference_samples, visits, budget,
+            output, options,
         )
     else:
         _sheet(scenes[0], reference_samples=reference_samples, output=output, **options)

@@ -119,7 +119,7 @@ class Grid:
 
 def grid(facts: Facts) -> Grid:
     """The frame's grid."""
-    return Grid.over(facts.rig.bounds, facts.settings.lpv.resolution)
+    return Grid.over(facts.rig.region, facts.settings.lpv.resolution)
 
 
 def _sh_size(facts: Facts) -> tuple[int, int, int]:

@@ -107,7 +107,8 @@ class SceneSync:
         source = depsgraph.scene_eval
         scene = Scene(name=source.name, frame=source.frame_current)
         images = ImageTable(self._images, scene.notes)
-        materials = _MaterialIndex(self, images, scene)
+        layer = depsgraph.view_layer
+        materials = _MaterialIndex(self, images, scene, layer.material_override)
         placed = _Placed()
         meshes: dict[tuple, int] = {}
         by_pointer: dict[int, int] = {}
@@ -145,7 +146,7 @@ class SceneSync:
                        visibility, _random(instance, obj), obj.pass_index, tuple(obj.color))  # fmt: skip
         self._meshes = {k: v for k, v in self._meshes.items() if k in used_keys}
         scene.instances = placed.instances()
-        scene.world = self._read_world(source, images)
+        scene.world = self._read_world(getattr(layer, "world_override", None) or source.world, images)
         sun = world_sun(scene.world.graph)
         if sun is not None and (sun.emission > 0.0).any():
             scene.lights.append(sun)
@@ -153,9 +154,9 @@ class SceneSync:
         scene.camera = camera or _read_camera(source, depsgraph, resolution, scene.notes)
         return scene
 
-    def _read_world(self, source: bpy.types.Scene, images: ImageTable) -> World:
+    def _read_world(self, source: bpy.types.World | None, images: ImageTable) -> World:
         """The world; the same object as last time if it looks the same."""
-        world = read_world(source.world, images)
+        world = read_world(source, images)
         used = [images.images[n.params["image"]] for n in world.graph.nodes if n.params.get("image") is not None]
         if self._world is not None:
             old, old_images = self._world
@@ -239,14 +240,16 @@ class SceneSync:
 
 
 class _MaterialIndex:
-    """Indices of Blender's materials in the scene's list, filled as they are met."""
+    """Indices of Blender's materials in the scene's list, filled as they are met. ``override`` is what the view layer
+    puts on every surface, if anything."""
 
-    def __init__(self, sync: SceneSync, images: ImageTable, scene: Scene) -> None:
-        self.sync, self.images, self.scene = sync, images, scene
+    def __init__(self, sync: SceneSync, images: ImageTable, scene: Scene, override: bpy.types.Material | None) -> None:
+        self.sync, self.images, self.scene, self.override = sync, images, scene, override
         self._index: dict[tuple[int, bool], int] = {}
 
     def index(self, material: bpy.types.Material | None, held: bool = False) -> int:
         """Index of a material; ``held``: of its variant that the camera sees as a hole."""
+        material = self.override or material
         key = material.original.session_uid if material is not None else 0
         if (key, held) not in self._index:
             found = self._get(material, key)
