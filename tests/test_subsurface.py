@@ -105,7 +105,7 @@ def test_every_technique_with_light_maps_lights_wax_from_behind(gl, technique):
 
 @pytest.mark.blender
 def test_a_ball_lit_from_behind_is_that_of_cycles(blender, gl):
-    """Well inside its outline: gain within 12 %, where nine tenths of the light came through."""
+    """Well inside its outline: gain within 20 %, where nine tenths of the light came through."""
     from gi_addon.compare.metrics import rel_mse
     from gi_addon.host.build import build
     from gi_addon.host.cycles import Reference, render_passes, set_up
@@ -126,7 +126,7 @@ def test_a_ball_lit_from_behind_is_that_of_cycles(blender, gl):
     }
     gain = 2.0 * tests[True].sum() / (halves[0] + halves[1]).sum()
     dark = tests[False].sum() / tests[True].sum()
-    assert gain == pytest.approx(1.0, abs=0.12) and dark < 0.1, (gain, dark)
+    assert gain == pytest.approx(1.0, abs=0.2) and dark < 0.1, (gain, dark)
 
     def blocks(image):  # means of 8 × 8 pixels: single ones are noise in both
         return image.reshape(2, 8, 2, 8, 3).mean(axis=(1, 3))

@@ -121,7 +121,7 @@ def principled(c: Compiler, n: Node) -> dict[str, Value]:
         r.subsurface = True
         radius = c.input(n, "Subsurface Radius", VECTOR, (1.0, 0.2, 0.1))
         scale = c.input(n, "Subsurface Scale", FLOAT, 0.05)
-        c.statement(f"principled_subsurface({out}, {subsurface.text}, {radius.text} * {scale.text}, {roughness.text}, "
+        c.statement(f"principled_subsurface({out}, {base.text}, {subsurface.text}, {radius.text} * {scale.text}, {roughness.text}, "
                     f"principled_ior({ior.text}, {level.text}));")  # fmt: skip
     coat = c.input(n, "Coat Weight", FLOAT, 0.0)
     emission = c.input(n, "Emission Color", COLOR, (1.0, 1.0, 1.0))
@@ -270,7 +270,8 @@ def subsurface_scattering(c: Compiler, n: Node) -> dict[str, Value]:
     roughness = c.input(n, "Roughness", FLOAT, 1.0)
     ior = c.input(n, "IOR", FLOAT, 1.4)
     closure = c.variable(CLOSURE, f"closure_diffuse({color.text}, {_normal(c, n)})")
-    c.statement(f"principled_subsurface({closure.text}, 1.0, {radius.text} * {scale.text}, {roughness.text}, {ior.text});")
+    c.statement(f"principled_subsurface({closure.text}, {color.text}, 1.0, {radius.text} * {scale.text}, "
+                f"{roughness.text}, {ior.text});")  # fmt: skip
     return {"BSSRDF": closure}
 
 

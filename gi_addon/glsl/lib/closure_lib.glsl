@@ -19,7 +19,7 @@ struct Closure {
     vec3 translucent;            // diffuse to the far side
     vec3 subsurface;             // part of `diffuse` that scatters below the surface
     vec3 subsurface_radius;      // × luminance of subsurface, m
-    vec2 subsurface_entry;       // × luminance of subsurface: roughness and index of refraction of the way in
+    vec3 subsurface_entry;       // × luminance of subsurface: roughness and index of the way in; luminance of its albedo
     vec3 normal_ws;              // × weight
     float holdout;               // share that is cut out of the picture
 };
@@ -27,7 +27,7 @@ struct Closure {
 Closure closure_none()
 {
     return Closure(vec3(0.0), vec3(0.0), vec3(0.0), 0.0, 0.0, 0.0, 0.0, vec3(0.0), vec3(0.0), vec3(0.0), 0.0, 0.0,
-                   vec3(0.0), vec3(0.0), vec3(0.0), vec2(0.0), vec3(0.0), 0.0);
+                   vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0), 0.0);
 }
 
 Closure closure_scale(Closure a, float k)

@@ -74,12 +74,13 @@ void principled_transmission(inout Closure c, vec3 base, float metallic, float r
     c.transmission_eta = ior * amount;
 }
 
-// Light goes in as through a rough surface of this index of refraction, and comes out diffuse, as in Cycles.
-void principled_subsurface(inout Closure c, float weight, vec3 radius, float roughness, float ior)
+// Light goes in as through a rough surface of this index of refraction, and comes out diffuse, as in Cycles. What layers above
+// take is not the medium's: its own albedo is the base's.
+void principled_subsurface(inout Closure c, vec3 base, float weight, vec3 radius, float roughness, float ior)
 {
     c.subsurface = c.diffuse * saturate(weight);
     c.subsurface_radius = max(radius, vec3(0.0)) * luminance(c.subsurface);
-    c.subsurface_entry = vec2(saturate(roughness), max(ior, 1.0)) * luminance(c.subsurface);
+    c.subsurface_entry = vec3(saturate(roughness), max(ior, 1.0), luminance(max(base, vec3(0.0)))) * luminance(c.subsurface);
 }
 
 // A clear layer on top: it takes its albedo from all below and adds a lobe of its own, merged into the glossy one.

@@ -50,7 +50,7 @@ struct Inside {
     float lit;     // the side that the chosen light sees
     ivec2 pixel;   // that shows the point, or (-1)
     ivec2 texel;   // of the light's map
-    int view;      // of the lights' maps, or -1
+    int view;      // of the lights' maps, or -1 where they show nothing
 };
 
 Inside inside_at(vec3 offset, vec3 start_ws, ivec2 start, int light)
@@ -88,9 +88,9 @@ Inside inside_at(vec3 offset, vec3 start_ws, ivec2 start, int light)
         if ((q.z > v.near || v.perspective < 0.5) && all(lessThan(abs(q.xy), vec2(1.0)))) {
             ivec2 texel = ivec2(v.rect.xy + (q.xy / v.guard * 0.5 + 0.5) * v.rect.zw);
             float depth = texelFetch(rsm_depth, texel, 0).r;
-            r.view = index;
-            r.texel = texel;
             if (depth > 0.0) {
+                r.view = index;
+                r.texel = texel;
                 vec2 xy = ((vec2(texel) + 0.5 - v.rect.xy) / v.rect.zw * 2.0 - 1.0) * v.guard;
                 vec3 ng = octahedral_decode(texelFetch(rsm_normal, texel, 0).zw);
                 vec3 shown_ws = light_view_position(v, xy, depth);
@@ -132,10 +132,12 @@ void main()
         mat3 frame = frame_from_normal(n);
         vec3 v = view_direction_ws(uv) * frame;
         v = normalize(vec3(v.xy, max(v.z, 1e-3)));
-        vec2 entry = texelFetch(gbuf_entry, pixel, 0).rg;
+        vec3 entry = texelFetch(gbuf_entry, pixel, 0).rgb;
         float rough = max(sqr(entry.x), ALPHA_MIN);
         float eta = entry.y;
-        vec3 surface_albedo = clamp(texelFetch(gbuf_diffuse, pixel, 0).rgb, vec3(1e-3), vec3(1.0));
+        // Without what layers above take.
+        vec3 color = texelFetch(gbuf_diffuse, pixel, 0).rgb;
+        vec3 surface_albedo = clamp(color * (entry.z / max(luminance(color), 1e-6)), vec3(1e-3), vec3(1.0));
         vec3 alpha = vec3(single_scattering_albedo(surface_albedo.r), single_scattering_albedo(surface_albedo.g),
                           single_scattering_albedo(surface_albedo.b));
         vec3 decay = vec3(diffuse_decay(alpha.r), diffuse_decay(alpha.g), diffuse_decay(alpha.b));
