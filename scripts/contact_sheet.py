@@ -5,8 +5,8 @@
 can be stopped and goes on; ``--references`` keeps Cycles' pictures in a folder of their own. Each scene is a process; one that
 ends by itself costs the technique it was at, which becomes a row that says so, and the others go on.
 
-A scene with ready references (``--ready``, as scripts/score_shared.py reads them) is rendered at their size and scored against both
-halves; else Cycles renders R∞ here: gain is against its own samples, FLIP and relMSE against the same ones denoised.
+A scene with ready references (``--ready``, as scripts/score_shared.py reads them) is rendered at their size and scored against
+both halves; else Cycles renders R∞ here: gain is against its own samples, FLIP and relMSE against the same ones denoised.
 """
 
 from __future__ import annotations
@@ -145,7 +145,7 @@ def compile_world_notes(plain) -> list[str]:
 def run_scene(path: Path, arguments) -> None:
     """Render a scene in processes of its own until nothing is missing; what fails is written down as failed."""
     files = Files(arguments, path)
-    while todo := missing(files, arguments):
+    while missing(files, arguments):
         done = subprocess.run([sys.executable, __file__, "--one", str(path), *sys.argv[1:]], capture_output=True, text=True,
                               check=False)  # fmt: skip
         left = missing(files, arguments)
@@ -154,7 +154,7 @@ def run_scene(path: Path, arguments) -> None:
         failed = left[0]
         text = (done.stderr.strip().splitlines() or ["no message"])[-1]
         print(f"{name_of(path)} {failed} failed ({done.returncode}): {done.stderr[-1500:]}", flush=True)
-        if failed == "Cycles" or len(left) == len(todo) == 0:
+        if failed == "Cycles":
             break
         files.facts(failed).write_text(json.dumps({"failed": f"{done.returncode}: {text}"}))
 
@@ -170,9 +170,11 @@ def result(path: Path, technique: str, arguments) -> dict:
         return facts
     picture, a, b = files.read_reference()
     test = np.load(files.picture(technique))
-    s = score(test, a, b, flip=False) if files.ready else score(test, picture)
-    facts[key] = {"flip": score(test, picture, flip=True).flip, "gain": float(test.sum() / a.sum()) if not files.ready else s.gain,
-                  "relmse": s.rel_mse}  # fmt: skip
+    halves = (a, b) if files.ready else (picture, None)
+    facts[key] = {
+        "flip": score(test, picture, flip=True).flip, "gain": float(test.sum() / (0.5 * (a.sum() + b.sum()))),
+        "relmse": score(test, *halves).rel_mse,
+    }  # fmt: skip
     files.facts(technique).write_text(json.dumps(facts))
     return facts
 
@@ -221,10 +223,8 @@ def write_sheet(paths: list[Path], arguments) -> None:
             draw.text((x + k * width + 2, y + 11), text, fill=(190, 190, 190))
     sheet.save(arguments.output / "sheet.jpg", quality=80)
     techniques = arguments.technique_list
-    table = [
-        "| scene | " + " | ".join(f"{t} FLIP / gain" for t in techniques) + " | triangles | sync ms | sub-frame ms | approximated |",
-        "|---" * (5 + len(techniques)) + "|",
-    ]
+    heads = ["scene", *(f"{t} FLIP / gain" for t in techniques), "triangles", "sync ms", "sub-frame ms", "approximated"]
+    table = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
     (arguments.output / "table.md").write_text("\n".join(table + [line(p, arguments) for p in paths]) + "\n")
 
 
@@ -251,13 +251,15 @@ def main() -> None:
     if arguments.one is not None:
         one(arguments)
         return
-    every = [arguments.scenes] if arguments.scenes.is_file() else sorted(p for p in arguments.scenes.rglob("*") if p.suffix in SUFFIXES)
+    every = [arguments.scenes]
+    if arguments.scenes.is_dir():
+        every = sorted(p for p in arguments.scenes.rglob("*") if p.suffix in SUFFIXES)
     paths = list(dict.fromkeys(p for part in arguments.only.split(",") for p in every if part in name_of(p)))
     for path in paths if not arguments.compose else ():
         run_scene(path, arguments)
         if arguments.technique_list and not missing(Files(arguments, path), arguments):
             print(line(path, arguments), flush=True)
-    whole = [p for p in paths if not [m for m in missing(Files(arguments, p), arguments)]]
+    whole = [p for p in paths if not missing(Files(arguments, p), arguments)]
     if arguments.technique_list and whole:
         write_sheet(whole, arguments)
 
