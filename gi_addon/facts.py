@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from .focus import Focus, find_focus
 from .lights import Emitters, LightRig, build_rig
 from .materials import CompiledGraph, Medium, mean_medium
 from .outputs import film_layers
@@ -90,10 +91,11 @@ def gather_facts(
     subframes: int,
     world: WorldMap | None,
     emitters: Emitters,
+    focus: Focus | None = None,
 ) -> Facts:
-    """Look at everything once. ``resolution`` is the picture's."""
+    """Look at everything once. ``resolution`` is the picture's; ``focus`` is found where it is not given."""
     margin = round(settings.ssdo.margin * max(resolution)) if settings.technique == "SSDO" else 0
-    bounds = scene.bounds()
+    focus = focus or find_focus(scene)
     s = settings
     seen = scene.instances.visibility & CAMERA if len(scene.instances) else np.zeros(0, "u4")
     used = {m for i, ms in enumerate(scene.instances.materials) if seen[i] for m in ms}
@@ -103,7 +105,7 @@ def gather_facts(
     bounced = bounced or (s.use_translucency and any(c.transmissive or c.subsurface for c in some))
     from_screen = s.technique == "SSDO" and s.ssdo.sources == "SCREEN"
     rig = build_rig(
-        scene.lights, bounds,
+        scene.lights, focus,
         world=None if from_screen else world, world_samples=s.world.samples,
         emitters=Emitters.none() if from_screen or voxels_shine(s) else emitters, emitter_samples=_EMITTER_SAMPLES,
         area_lights=s.use_area_lights,
@@ -126,7 +128,7 @@ def gather_facts(
         outputs=outputs,
         subframes=subframes,
         rig=rig,
-        radius=float(np.linalg.norm(bounds[1] - bounds[0]) / 2.0) or 1.0,
+        radius=float(np.linalg.norm(focus.region[1] - focus.region[0]) / 2.0) or 1.0,
         triangles=scene.triangle_count(),
         visible=bool(seen.any()) and scene.triangle_count() > 0,
         emissive=any(c.emissive for c in some),

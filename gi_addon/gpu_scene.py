@@ -53,13 +53,17 @@ class DrawList:
     half: np.ndarray
     buffer: moderngl.Buffer
 
-    def visible(self, clip_from_world: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def visible(self, clip_from_world: np.ndarray, beyond: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
         """The commands whose boxes touch the view volume of ``clip_from_world`` (column-major as for GLSL), and how
-        many of them each batch has."""
+        many of them each batch has. What lies wholly in the box ``beyond`` (2, 3) is left out."""
         m = clip_from_world.reshape(4, 4).T.astype("f8")
         planes = np.concatenate([m[3] + m[:3], m[3] - m[:3]])
         distance = self.center @ planes[:, :3].T + planes[:, 3] + self.half @ np.abs(planes[:, :3]).T
         seen = (distance >= 0.0).all(axis=1)
+        if beyond is not None:
+            middle, reach = beyond.mean(axis=0), (beyond[1] - beyond[0]) / 2.0
+            # Boxes that make up ``beyond`` touch its sides, by rounding from without.
+            seen &= (np.abs(self.center - middle) + self.half > reach + 1e-6 * (reach.max() + np.abs(middle).max())).any(axis=1)
         return self.commands[seen], np.bincount(self.batch[seen], minlength=len(self.materials))
 
 
@@ -256,15 +260,18 @@ class GPUScene:
         """What was synced last."""
         return self._scene
 
-    def draw(self, planned: Planned, stages, visibility: int, clip_from_world: np.ndarray, **options) -> None:
+    def draw(
+        self, planned: Planned, stages, visibility: int, clip_from_world: np.ndarray, *, beyond: np.ndarray | None = None,
+        **options,
+    ) -> None:
         """Draw surfaces that ``visibility`` rays see, each with its material's function.
 
         ``stages`` are the pass's shader files. Options: ``full`` evaluates every material, else only those that let light
         through; ``units`` is the first texture unit free for materials; ``defines``; ``only`` draws materials with that
-        flag of CompiledGraph alone.
+        flag of CompiledGraph alone. Nothing is drawn that lies wholly in the box ``beyond``.
         """
         draws, prepared = self._prepared(planned, stages, visibility, options)
-        commands, counts = draws.visible(clip_from_world)
+        commands, counts = draws.visible(clip_from_world, beyond)
         if len(commands):
             draws.buffer.write(np.ascontiguousarray(commands))
         first = 0

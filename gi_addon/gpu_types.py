@@ -21,6 +21,8 @@ VIEW = struct(
     ("resolution", "f4", 2), ("inverse_resolution", "f4", 2),
     ("pixel_offset", "i4", 2), ("subframe", "u4"), ("subframes", "u4"),
     ("margin", "i4"), ("_pad0", "u4"), ("_pad1", "u4"), ("_pad2", "u4"),  # px drawn around the picture, within resolution
+    # What world coordinates on the GPU leave out: a scene far from the origin is moved near it, for the sake of 32 bits.
+    ("world_origin", "f4", 3), ("_pad3", "u4"),
 )  # fmt: skip
 
 # One point of a light, good for one sub-frame. `kind` is one of the LIGHT_ constants; `emission` is irradiance (W/m²)

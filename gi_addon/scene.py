@@ -207,6 +207,12 @@ class Camera:
     def orthographic(self) -> bool:
         return bool(self.clip_from_view[3, 3] == 1.0)
 
+    def moved(self, offset: np.ndarray) -> Camera:
+        """This camera ``offset`` (3,) m further."""
+        matrix = np.array(self.world_from_view, "f8")
+        matrix[:3, 3] += offset
+        return replace(self, world_from_view=matrix)
+
 
 @dataclass(eq=False)
 class World:
@@ -298,6 +304,32 @@ class Scene:
         if len(boxes) == 0:
             return np.array([[-0.5] * 3, [0.5] * 3])
         return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
+
+    def far_origin(self) -> np.ndarray:
+        """A point (3,) near the scene's middle if that is far from the origin for the scene's size, else the origin.
+
+        32-bit coordinates at distance D are D/2²⁴ apart; up to 16 radii that costs four bits, which everything is made to
+        bear. Steps of 16 radii, rounded up to a power of two, keep the point where it is while objects move about.
+        """
+        low, high = self.bounds()
+        radius = 0.5 * float(np.linalg.norm(high - low))
+        middle = (low + high) / 2.0
+        if not np.isfinite(middle).all() or float(np.abs(middle).max()) <= 16.0 * radius or radius <= 0.0:
+            return np.zeros(3)
+        step = 2.0 ** np.ceil(np.log2(16.0 * radius))
+        return np.round(middle / step) * step
+
+    def moved(self, offset: np.ndarray) -> Scene:
+        """This scene with everything placed ``offset`` (3,) m further; meshes, materials and images are shared."""
+        shift = np.zeros((4, 4))
+        shift[:3, 3] = offset
+        camera = self.camera
+        return replace(
+            self,
+            instances=replace(self.instances, matrix=self.instances.matrix + shift),
+            lights=[replace(light, matrix=light.matrix + shift) for light in self.lights],
+            camera=camera and camera.moved(offset),
+        )
 
     # -- identity ------------------------------------------------------------------------------------------------
 

@@ -177,7 +177,11 @@ def closed_forms(
             lines.append(f"{traits.blockers}: no cell size keeps light out of walls (w* was not reached up to 4 cells)")
         path = f"{settings.technique.lower()}.iterations"
         if has_setting(path):
-            lines.append(f"{path} {resolution}: the scene's extent in cells (set to {settings.get(path)})")
+            # Light steps over a face at a time: corner to corner are three sides of the box.
+            steps = math.ceil(float((bounds[1] - bounds[0]).sum()) / extent * resolution)
+            chosen = int(settings.get(path))
+            state = "0: light crosses the whole grid" if chosen == 0 else "holds" if chosen >= steps else f"set to {chosen}"
+            lines.append(f"{path} {steps}: cells from corner to corner of the scene, face by face ({state})")
     lines += [f"no {task.title}: {reason}" for task, reason in plan.skipped]
     return lines
 

@@ -267,8 +267,9 @@ def picture(render: bpy.types.RenderSettings) -> tuple[tuple[int, int], tuple[in
     height = render.resolution_y * render.resolution_percentage // 100
     if not render.use_border:
         return (width, height), (0, 0, width, height)
-    x0, x1 = int(render.border_min_x * width), int(render.border_max_x * width)
-    y0, y1 = int(render.border_min_y * height), int(render.border_max_y * height)
+    # In 32 bits, as Blender does: 0.9 × 50 is 45 there, and just below it in 64.
+    x0, x1 = (int(np.float32(v) * np.float32(width)) for v in (render.border_min_x, render.border_max_x))
+    y0, y1 = (int(np.float32(v) * np.float32(height)) for v in (render.border_min_y, render.border_max_y))
     return (width, height), (x0, y0, max(0, x1 - x0), max(0, y1 - y0))
 
 

@@ -109,6 +109,7 @@ class SceneSync:
         source = depsgraph.scene_eval
         scene = Scene(name=source.name, frame=source.frame_current)
         images = ImageTable(self._images, scene.notes)
+        layer = depsgraph.view_layer
         materials = _MaterialIndex(self, images, scene, depsgraph)
         placed = _Placed()
         meshes: dict[tuple, int] = {}
@@ -138,7 +139,7 @@ class SceneSync:
                 _note(scene, f"object {obj.name} is left out: its transform is not a number")
                 continue
             slots = [slot.material for slot in obj.material_slots] or list(getattr(obj.data, "materials", [])) or [None]
-            pointy = any(materials.reads(m, "NEW_GEOMETRY", "Pointiness") for m in slots)
+            pointy = any(materials.asks(m)[1] for m in slots)
             index = self._mesh_index(obj, scene, meshes, by_pointer, used_keys, pointy)
             if index is None:
                 continue
@@ -147,7 +148,7 @@ class SceneSync:
                        visibility, _random(instance, obj), obj.pass_index, tuple(obj.color))  # fmt: skip
         self._meshes = {k: v for k, v in self._meshes.items() if k in used_keys}
         scene.instances = placed.instances()
-        scene.world = self._read_world(source, images)
+        scene.world = self._read_world(getattr(layer, "world_override", None) or source.world, images)
         sun = world_sun(scene.world.graph)
         if sun is not None and (sun.emission > 0.0).any():
             scene.lights.append(sun)
@@ -155,9 +156,9 @@ class SceneSync:
         scene.camera = camera or _read_camera(source, depsgraph, resolution, scene.notes)
         return scene
 
-    def _read_world(self, source: bpy.types.Scene, images: ImageTable) -> World:
+    def _read_world(self, source: bpy.types.World | None, images: ImageTable) -> World:
         """The world; the same object as last time if it looks the same."""
-        world = read_world(source.world, images)
+        world = read_world(source, images)
         used = [images.images[n.params["image"]] for n in world.graph.nodes if n.params.get("image") is not None]
         if self._world is not None:
             old, old_images = self._world
@@ -242,25 +243,33 @@ class SceneSync:
 
 class _MaterialIndex:
     """Indices of Blender's materials in the scene's list, filled as they are met. A variant is a material of its own, but
-    has the program of the one it comes from where only numbers differ."""
+    has the program of the one it comes from where only numbers differ. The view layer may put one on every surface."""
 
     def __init__(self, sync: SceneSync, images: ImageTable, scene: Scene, depsgraph: bpy.types.Depsgraph) -> None:
         self.sync, self.images, self.scene, self.depsgraph = sync, images, scene, depsgraph
+        self.override = depsgraph.view_layer.material_override
         self._index: dict[tuple, int] = {}
         self._read: dict[int, Material] = {}
+        self._asked: dict[int, tuple] = {}
 
     def index(self, material: bpy.types.Material | None) -> int:
         """Index of a material, attributes of objects being 0."""
-        return self._variant(material, False, ())
+        return self._variant(self.override or material, False, ())
 
     def placed(self, material: bpy.types.Material | None, instance, obj: bpy.types.Object, held: bool) -> int:
         """Index of a material as ``obj`` wears it; ``held``: of its variant that the camera sees as a hole."""
-        names = attributes.asked_of_objects(self._get(material).graph)
+        material = self.override or material
+        names, _ = self.asks(material)
         return self._variant(material, held, attributes.values_of(names, instance, obj, self.depsgraph) if names else ())
 
-    def reads(self, material: bpy.types.Material | None, kind: str, output: str) -> bool:
-        """Whether the material's nodes read an ``output`` of a node of this ``kind``."""
-        return self._get(material).graph.reads(kind, output)
+    def asks(self, material: bpy.types.Material | None) -> tuple[tuple[attributes.Name, ...], bool]:
+        """What a material wants to know of the object that wears it: attributes, and whether pointiness."""
+        material = self.override or material
+        key = _uid(material)
+        if key not in self._asked:
+            graph = self._get(material).graph
+            self._asked[key] = (attributes.asked_of_objects(graph), graph.reads("NEW_GEOMETRY", "Pointiness"))
+        return self._asked[key]
 
     def _variant(self, material, held: bool, values: tuple) -> int:
         key = (_uid(material), held, values)

@@ -15,9 +15,8 @@ HOSEK_SLANT = 0.01
 
 
 def hosek_neighbours(turbidity: float, elevation: float, albedo: float) -> Iterator[tuple[float, np.ndarray]]:
-    """(weight, numbers (3, 7) per channel) of the grid's corners around a setting: those of Perez's formula, and its factor below
-    the horizon. Weights sum to 1.
-    ``elevation`` in rad."""
+    """(weight, numbers (3, 7) per channel) of the grid's corners around a setting: those of Perez's formula, and its factor
+    below the horizon. Weights sum to 1; ``elevation`` in rad."""
     axes = (table.TURBIDITIES, table.ELEVATIONS, table.ALBEDOS)
     numbers = np.array(table.NUMBERS).reshape(*(len(a) for a in axes), 3, 7)
     at = (turbidity, np.degrees(elevation), albedo)

@@ -305,6 +305,10 @@ def value(c: Compiler, n: Node) -> dict[str, Value]:
     return {"Value": c.constant(n.params.get("value", 0.0), FLOAT)}
 
 
+# A surface point where Blender has it (``Renderer.begin`` moves far scenes).
+_POSITION = "(point.position_ws + view.world_origin)"
+
+
 def _transformed(c: Compiler, v: str, rows) -> str:
     """``v`` under an affine matrix (three rows of four)."""
     columns = ", ".join(c.constant(tuple(row[:3]), VECTOR).text for row in rows)
@@ -318,7 +322,7 @@ def texture_coordinate(c: Compiler, n: Node) -> dict[str, Value]:
     direction = local = "point.position_ws" if c.world else "point.position_os"
     rows = n.params.get("object_matrix")
     if rows and c.used(n, "Object"):
-        local = _transformed(c, "point.position_ws", rows)
+        local = _transformed(c, "point.position_ws" if c.world else _POSITION, rows)
     uv = Value(VECTOR, "vec3(0.0)")
     if c.used(n, "UV") and not c.world:
         uv = Value(VECTOR, f"vec3({c.attribute('uv:')}.xy, 0.0)")
@@ -370,7 +374,7 @@ def _attribute(v: str) -> dict[str, Value]:
 @node("NEW_GEOMETRY")
 def geometry(c: Compiler, n: Node) -> dict[str, Value]:
     return {
-        "Position": Value(VECTOR, "point.position_ws"),
+        "Position": Value(VECTOR, "point.position_ws" if c.world else _POSITION),
         "Normal": Value(VECTOR, "point.normal_ws"),
         "Tangent": Value(VECTOR, "vec3(1.0, 0.0, 0.0)"),
         "True Normal": Value(VECTOR, "point.geometric_normal_ws"),
@@ -385,7 +389,7 @@ def geometry(c: Compiler, n: Node) -> dict[str, Value]:
 @node("OBJECT_INFO")
 def object_info(c: Compiler, n: Node) -> dict[str, Value]:
     return {
-        "Location": Value(VECTOR, "point.object_location"),
+        "Location": Value(VECTOR, "(point.object_location + view.world_origin)"),
         "Color": Value(COLOR, "point.object_color.xyz"),
         "Alpha": Value(FLOAT, "point.object_color.w"),
         "Object Index": Value(FLOAT, "point.object_index"),
