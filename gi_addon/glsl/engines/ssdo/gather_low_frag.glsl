@@ -16,7 +16,7 @@ void main()
     vec2 uv = (vec2(pixel) + 0.5) * view.inverse_resolution;
     vec4 normals = texelFetch(low_normal, block, 0);
     Gathered g = gather_screen(position_ws_from_depth(uv, depth), octahedral_decode(normals.xy), octahedral_decode(normals.zw),
-                               view_direction_ws(uv), hash_u32(uvec2(pixel + view.pixel_offset)));
+                               view_direction_ws(uv), block);
     raw_indirect = vec4(g.radiance, 1.0);
     raw_direction = g.direction;
 }
