@@ -12,8 +12,6 @@ from gi_addon.compare import scenes
 from gi_addon.renderer import inspect
 from gi_addon.settings import Settings, walk
 
-INTEGRATORS = ("RAYS", "BITMASK")
-
 
 def ssdo(scene, *outputs, **settings):
     return make(scene, *outputs, technique="SSDO", **settings)
@@ -37,13 +35,12 @@ def sphere_hits(lamp, count: int = 200_000) -> np.ndarray:
     return lamp + d * (np.sqrt(along**2 - lamp @ lamp + 1.0) - along)[:, None]
 
 
-@pytest.mark.parametrize("integrator", INTEGRATORS)
 @pytest.mark.parametrize("lamp", [(0.0, 0.0, 0.0), (0.0, 0.8, 0.0)])
-def test_sphere_one_bounce_is_the_share_of_lit_surface_on_screen(gl, integrator, lamp):
+def test_sphere_one_bounce_is_the_share_of_lit_surface_on_screen(gl, lamp):
     """Stability test 1. In a sphere every patch lights every point alike, 1/(4πR²) per flux: what the screen shows of the
     flux is what a point gets of E₁ = ρΦ/(4πR²). g = share ± .03."""
     scene = scenes.integrating_sphere(albedo=0.5, power=100.0, light=lamp)
-    image = ssdo(scene, "Diffuse Indirect", samples=4, ssdo__integrator=integrator).passes["Diffuse Indirect"][..., 0]
+    image = ssdo(scene, "Diffuse Indirect", samples=4).passes["Diffuse Indirect"][..., 0]
     g = image.mean() * np.pi / (0.5 * 100.0 / (4 * np.pi))
     assert g == pytest.approx(seen_share(scene.camera, sphere_hits(lamp)), abs=0.03)
 
@@ -84,13 +81,11 @@ def wall_points(camera, shape) -> tuple[np.ndarray, np.ndarray]:
     return on, p[on]
 
 
-@pytest.mark.parametrize("integrator", INTEGRATORS)
-def test_a_lit_floor_lights_a_wall_by_its_form_factor(gl, integrator):
+def test_a_lit_floor_lights_a_wall_by_its_form_factor(gl):
     """E = ρ E_sun F with Lambert's polygon formula, both surfaces on the screen: the mean to 2 %, three heights of the wall to
     5 %, single pixels to 10 % in the mean."""
     camera = scenes.perspective((0.3, -3.2, 1.8), (0, 0.3, 0.3), 0.9)
-    image = ssdo(corner(camera), "Diffuse Indirect", samples=8, gather_scale=1,
-                 ssdo__integrator=integrator).passes["Diffuse Indirect"][..., 0]  # fmt: skip
+    image = ssdo(corner(camera), "Diffuse Indirect", samples=8, gather_scale=1).passes["Diffuse Indirect"][..., 0]  # fmt: skip
     on, points = wall_points(camera, image.shape)
     expected = 0.8 * 5.0 / np.pi * polygon_irradiance(points, (0, -1, 0), FLOOR) / np.pi
     got = image[on]
@@ -101,8 +96,7 @@ def test_a_lit_floor_lights_a_wall_by_its_form_factor(gl, integrator):
     assert np.abs(got / expected - 1).mean() < 0.1
 
 
-@pytest.mark.parametrize("integrator", INTEGRATORS)
-def test_brightness_does_not_change_with_zoom_view_or_size(gl, integrator):
+def test_brightness_does_not_change_with_zoom_view_or_size(gl):
     """± 3 %: the wall's light seen from near and far, through wide and narrow lenses, in pictures of three sizes, and by
     an orthographic camera; everything stays on the screen. Gathered at every pixel: blocks of four interpolated over a wall
     of a few blocks are another error, 4 %."""
@@ -116,20 +110,18 @@ def test_brightness_does_not_change_with_zoom_view_or_size(gl, integrator):
     ]
     gains = []
     for camera, size in views:
-        p = ssdo(corner(camera), "Diffuse Indirect", resolution=size, samples=8, gather_scale=1,
-                 ssdo__integrator=integrator).passes  # fmt: skip
+        p = ssdo(corner(camera), "Diffuse Indirect", resolution=size, samples=8, gather_scale=1).passes  # fmt: skip
         on, points = wall_points(camera, size[::-1])
         expected = 0.8 * 5.0 / np.pi * polygon_irradiance(points, (0, -1, 0), FLOOR) / np.pi
         gains.append(p["Diffuse Indirect"][..., 0][on].sum() / expected.sum())
     assert np.abs(np.array(gains) - 1).max() <= 0.03, gains
 
 
-@pytest.mark.parametrize("integrator", INTEGRATORS)
-def test_the_low_resolution_gather_changes_little(gl, integrator):
+def test_the_low_resolution_gather_changes_little(gl):
     """Smoothed and interpolated over blocks of 4 pixels: the mean within 3 %, and each pixel within 8 % in the mean."""
     scene = corner(scenes.perspective((0.3, -3.2, 1.8), (0, 0.3, 0.3), 0.9))
     full, low = (
-        ssdo(scene, "Diffuse Indirect", samples=8, resolution=(160, 90), gather_scale=s, ssdo__integrator=integrator,
+        ssdo(scene, "Diffuse Indirect", samples=8, resolution=(160, 90), gather_scale=s,
              ssdo__samples=256).passes["Diffuse Indirect"]
         for s in (1, 4)
     )  # fmt: skip
@@ -150,25 +142,22 @@ def test_more_bounces_follow_the_geometric_series(gl, bounces):
 
 def test_a_flat_plane_never_lights_itself(gl):
     scene = scenes.plane_scene(scenes.point_light((0, 0, 1), 100.0))
-    for integrator in INTEGRATORS:
-        image = ssdo(scene, "Diffuse Indirect", samples=2, ssdo__integrator=integrator).passes["Diffuse Indirect"]
-        assert image.max() == 0.0
+    assert ssdo(scene, "Diffuse Indirect", samples=2).passes["Diffuse Indirect"].max() == 0.0
 
 
-@pytest.mark.parametrize("integrator", INTEGRATORS)
-def test_the_world_arrives_through_open_directions(gl, integrator):
+def test_the_world_arrives_through_open_directions(gl):
     """Directional occlusion alone: a plane under a world of radiance L has E/π = L; at the foot of an endless wall half."""
     b = scenes.SceneBuilder()
     b.quads(FLOOR[None] * 3, scenes.diffuse((0.8,) * 3))
     scene = b.build(scenes.perspective((0, -3, 2), (0, 0, 0), 0.8), scenes.world((0.5, 0.6, 0.7)))
-    p = ssdo(scene, "Diffuse Direct", "Depth", samples=4, ssdo__integrator=integrator, ssdo__sources="SCREEN").passes
+    p = ssdo(scene, "Diffuse Direct", "Depth", samples=4, ssdo__sources="SCREEN").passes
     seen = p["Depth"][..., 0] < 1e9
     assert p["Diffuse Direct"][seen].mean(axis=0) == pytest.approx(np.array([0.5, 0.6, 0.7]), rel=0.01)
     b = scenes.SceneBuilder()
     b.quads(FLOOR[None] * 3, scenes.diffuse((0.5,) * 3))
     b.quads(np.array([[[-30, 0, 0], [30, 0, 0], [30, 0, 30], [-30, 0, 30]]]), scenes.diffuse((0.5,) * 3))
     scene = b.build(scenes.orthographic((0, -0.6, 0.6), (0, 0, 0), 0.5), scenes.world((1, 1, 1)))
-    p = ssdo(scene, "Diffuse Direct", "Normal", samples=8, ssdo__integrator=integrator, ssdo__sources="SCREEN",
+    p = ssdo(scene, "Diffuse Direct", "Normal", samples=8, ssdo__sources="SCREEN",
              gather_scale=1).passes  # fmt: skip
     floor = (p["Normal"][..., 2] > 0.999) & (p["Diffuse Direct"][..., 0] > 0)
     near = floor & (np.roll(~floor, -2, axis=0))  # two pixels below the wall's foot
@@ -228,11 +217,10 @@ def test_slices_weigh_one_in_the_mean_and_their_sectors_tile(gl):
 # --- stability ----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("integrator", INTEGRATORS)
-def test_light_is_linear_in_power(gl, integrator):
+def test_light_is_linear_in_power(gl):
     """Stability test 17: power × k scales every light pass by k, 1e-3; two lights are the sum of each."""
     names = ("Combined", "Diffuse Direct", "Diffuse Indirect")
-    settings = {"samples": 2, "ssdo__integrator": integrator, "resolution": (64, 36)}
+    settings = {"samples": 2, "resolution": (64, 36)}
     a, b = (ssdo(scenes.cornell(power=p), *names, **settings).passes for p in (60.0, 60e3))
     for name in names:
         assert np.abs(a[name][..., :3] * 1e3 - b[name][..., :3]).max() <= 1e-3 * b[name][..., :3].max(), name
@@ -247,11 +235,10 @@ def test_light_is_linear_in_power(gl, integrator):
     assert np.abs(box(*lights) - total).max() <= 1e-3 * total.max()
 
 
-@pytest.mark.parametrize("integrator", INTEGRATORS)
-def test_the_same_input_gives_the_same_picture_bit_for_bit(gl, integrator):
+def test_the_same_input_gives_the_same_picture_bit_for_bit(gl):
     """Stability test 16."""
     scene = scenes.cornell()
-    a, b = (ssdo(scene, "Combined", samples=2, bounces=2, ssdo__integrator=integrator).passes["Combined"] for _ in range(2))
+    a, b = (ssdo(scene, "Combined", samples=2, bounces=2).passes["Combined"] for _ in range(2))
     assert np.array_equal(a, b)
 
 
@@ -370,7 +357,7 @@ def test_every_pass_is_finite_whatever_the_scene(gl, sources):
 
 
 OTHER = {
-    "ssdo.samples": 64, "ssdo.steps": 4, "ssdo.integrator": "BITMASK", "ssdo.radius": 0.2, "ssdo.thickness": 0.02,
+    "ssdo.samples": 64, "ssdo.steps": 4, "ssdo.radius": 0.2, "ssdo.thickness": 0.02,
     "ssdo.margin": 0.25, "ssdo.sources": "SCREEN", "ssdo.occlusion": "BITMASK", "ssdo.shadows": "SCREEN",
     "ssdo.contact": 0.5, "ssdo.volumetric": "RADIAL",
 }  # fmt: skip

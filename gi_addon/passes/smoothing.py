@@ -4,11 +4,10 @@
 from __future__ import annotations
 
 from ..facts import Facts
-from ..frame import Frame
-from ..graph import Pass, Planned, Texture
+from ..graph import Texture
 from .gbuffer import gather_size
+from .screen import LIGHT, ScreenPass
 
-LIGHT = "radiance a white Lambert surface would reflect, W/(m²·sr)"
 _DIRECTION = "Σ luminance × direction, and Σ luminance, of what arrives"
 
 
@@ -20,10 +19,10 @@ def raw_gather(low: str) -> tuple[Texture, Texture]:
     )
 
 
-class BlockSmoothing(Pass):
+class BlockSmoothing(ScreenPass):
     """Neighbouring blocks of one surface share their directions: ``low``.raw becomes ``low``, for passes/interpolate.glsl."""
 
-    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "passes/smooth_blocks_frag.glsl"}}
+    fragment = "passes/smooth_blocks_frag.glsl"
 
     def __init__(self, low: str, title: str, figure: str = "") -> None:
         self.title, self.figure = title, figure
@@ -35,6 +34,3 @@ class BlockSmoothing(Pass):
 
     def defines(self, facts: Facts) -> dict[str, int]:
         return {"GATHER_SCALE": facts.settings.gather_scale}
-
-    def run(self, frame: Frame, planned: Planned) -> None:
-        frame.screen(planned, frame.program(planned))

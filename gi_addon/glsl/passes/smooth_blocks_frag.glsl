@@ -9,29 +9,18 @@
 #include "lib/view_lib.glsl"
 #include "lib/math_lib.glsl"
 #include "lib/sequence_lib.glsl"
-#include "passes/gather_grid.glsl"
+#include "passes/gather_receiver.glsl"
 
-const float SAME_FACING = 0.906; // cos 25°
 // Pairs of opposite blocks, and their weight in a tent of three by three.
 const int PAIRS = 4;
 const ivec2 PAIR[PAIRS] = ivec2[PAIRS](ivec2(1, 0), ivec2(0, 1), ivec2(1, 1), ivec2(1, -1));
 const float WEIGHT[PAIRS] = float[PAIRS](0.5, 0.5, 0.25, 0.25);
 
-vec3 block_position(ivec2 block, float depth)
+// Whether block `other` shows the surface of `here`.
+bool same_surface(ivec2 other, ivec2 last, Receiver here, float off_plane)
 {
-    ivec2 pixel = gather_grid_pixel(block, texelFetch(low_pixel, block, 0).rg);
-    return position_ws_from_depth((vec2(pixel) + 0.5) * view.inverse_resolution, depth);
-}
-
-// Whether `other` shows the surface through `position_ws` with the triangle's normal `ng`.
-bool same_surface(ivec2 other, ivec2 last, vec3 position_ws, vec3 ng, float off_plane)
-{
-    if (any(lessThan(other, ivec2(0))) || any(greaterThan(other, last))) {
-        return false;
-    }
-    float depth = texelFetch(low_depth, other, 0).r;
-    return depth > 0.0 && dot(octahedral_decode(texelFetch(low_normal, other, 0).zw), ng) >= SAME_FACING &&
-           abs(dot(block_position(other, depth) - position_ws, ng)) <= off_plane;
+    return all(greaterThanEqual(other, ivec2(0))) && all(lessThanEqual(other, last)) &&
+           on_surface(gather_receiver(other), here.position_ws, here.ng, off_plane);
 }
 
 void main()
@@ -39,19 +28,17 @@ void main()
     ivec2 block = ivec2(gl_FragCoord.xy);
     low_indirect = texelFetch(raw_indirect, block, 0);
     low_direction = texelFetch(raw_direction, block, 0);
-    float depth = texelFetch(low_depth, block, 0).r;
-    if (depth <= 0.0) {
+    Receiver here = gather_receiver(block);
+    if (!here.exists) {
         return;
     }
-    vec3 ng = octahedral_decode(texelFetch(low_normal, block, 0).zw);
-    vec3 position_ws = block_position(block, depth);
-    float off_plane = float(GATHER_SCALE) * pixel_width(depth);
+    float off_plane = float(GATHER_SCALE) * pixel_width(here.depth);
     ivec2 last = textureSize(low_depth, 0) - 1;
     float weight = 1.0;
     for (int k = 0; k < PAIRS; ++k) {
         ivec2 a = block + PAIR[k];
         ivec2 b = block - PAIR[k];
-        if (same_surface(a, last, position_ws, ng, off_plane) && same_surface(b, last, position_ws, ng, off_plane)) {
+        if (same_surface(a, last, here, off_plane) && same_surface(b, last, here, off_plane)) {
             low_indirect += WEIGHT[k] * (texelFetch(raw_indirect, a, 0) + texelFetch(raw_indirect, b, 0));
             low_direction += WEIGHT[k] * (texelFetch(raw_direction, a, 0) + texelFetch(raw_direction, b, 0));
             weight += 2.0 * WEIGHT[k];
