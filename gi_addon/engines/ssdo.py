@@ -216,7 +216,7 @@ def _title(sent: str) -> str:
 
 
 def _smoothing(sent: str, low: str) -> BlockSmoothing:
-    return BlockSmoothing(low, f"{_title(sent)} (smoothing)", "Gaussian Blur")
+    return BlockSmoothing(low, f"{_title(sent)} (smoothing)", "Gaussian Blur", in_pairs=True)
 
 
 def _read(sent: str) -> str | Optional:

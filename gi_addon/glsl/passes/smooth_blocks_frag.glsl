@@ -3,8 +3,10 @@
 // large. The interpolation that follows takes as much for granted: that indirect light is smooth over a few blocks of one
 // surface (passes/interpolate.glsl, whose tests of that these are).
 //
-// A block counts if the one opposite to it does: light that falls off towards an edge would else be taken from one side only,
-// and E at the foot of a wall came out 13 % too low (stability test 6's scene). In pairs, what is linear over blocks stays.
+// IN_PAIRS: a block counts if the one opposite to it does. Light that falls off towards an edge is else taken from one side only:
+// E at the foot of a wall came out 13 % too low (stability test 6's scene). What is linear over blocks then stays, what is curved
+// does not, by the square of a block's width: so the n-th sub-frame takes 1/n of its neighbours, as the mean of n has 1/n of
+// the noise; but all of them where blocks are pixels.
 
 #include "lib/view_lib.glsl"
 #include "lib/math_lib.glsl"
@@ -16,7 +18,7 @@ const int PAIRS = 4;
 const ivec2 PAIR[PAIRS] = ivec2[PAIRS](ivec2(1, 0), ivec2(0, 1), ivec2(1, 1), ivec2(1, -1));
 const float WEIGHT[PAIRS] = float[PAIRS](0.5, 0.5, 0.25, 0.25);
 
-// Whether block `other` shows the surface of `here`.
+// Whether there is a block `other` and it shows the surface of `here`.
 bool same_surface(ivec2 other, ivec2 last, Receiver here, float off_plane)
 {
     return all(greaterThanEqual(other, ivec2(0))) && all(lessThanEqual(other, last)) &&
@@ -34,15 +36,23 @@ void main()
     }
     float off_plane = float(GATHER_SCALE) * pixel_width(here.depth);
     ivec2 last = textureSize(low_depth, 0) - 1;
+    float share = IN_PAIRS != 0 && GATHER_SCALE > 1 ? 1.0 / float(view.subframe + 1u) : 1.0;
     float weight = 1.0;
     for (int k = 0; k < PAIRS; ++k) {
         ivec2 a = block + PAIR[k];
         ivec2 b = block - PAIR[k];
-        if (same_surface(a, last, here, off_plane) && same_surface(b, last, here, off_plane)) {
-            low_indirect += WEIGHT[k] * (texelFetch(raw_indirect, a, 0) + texelFetch(raw_indirect, b, 0));
-            low_direction += WEIGHT[k] * (texelFetch(raw_direction, a, 0) + texelFetch(raw_direction, b, 0));
-            weight += 2.0 * WEIGHT[k];
+        bool has_a = same_surface(a, last, here, off_plane);
+        bool has_b = same_surface(b, last, here, off_plane);
+        if (IN_PAIRS != 0) {
+            has_a = has_b = has_a && has_b;
         }
+        float w_a = has_a ? WEIGHT[k] * share : 0.0;
+        float w_b = has_b ? WEIGHT[k] * share : 0.0;
+        a = clamp(a, ivec2(0), last);
+        b = clamp(b, ivec2(0), last);
+        low_indirect += w_a * texelFetch(raw_indirect, a, 0) + w_b * texelFetch(raw_indirect, b, 0);
+        low_direction += w_a * texelFetch(raw_direction, a, 0) + w_b * texelFetch(raw_direction, b, 0);
+        weight += w_a + w_b;
     }
     low_indirect /= weight;
     low_direction /= weight;
