@@ -454,7 +454,7 @@ def _blur(image: np.ndarray, n: int = 7) -> np.ndarray:
     return np.apply_along_axis(lambda c: np.convolve(c, kernel, "valid"), 0, image)
 
 
-@test("10", "Banding", "flat receiver, 16 sets, T less the exact light: std(T − blur T)/mean T; CV of the mean over sets", fast=False)
+@test("10", "Banding", "flat receiver, 16 sets, T less R: std(T − blur T)/mean T; CV of the mean over sets", fast=False)
 def banding(suite: Suite) -> Finding:
     """A floor lit by one wall; the sets are other draws of the technique's samples."""
     b = scenes.SceneBuilder()
@@ -487,15 +487,9 @@ def banding(suite: Suite) -> Finding:
     out.pictures["receiver"] = _picture(image, 0.8 / max(mean, 1e-12))
     path = suite.traits.set
     if path and has_setting(path):
-        base = int(suite.settings().get(path))
+        base, name = int(suite.settings().get(path)), path.replace(".", "__")
         sets = [
-            float(
-                np.mean(
-                    _gray(suite.indirect(scene, samples=1, use_ao=False, **{path.replace(".", "__"): base + k * suite.traits.stride}))[
-                        np.isfinite(ground)
-                    ]
-                )
-            )
+            float(np.mean(_gray(suite.indirect(scene, samples=1, use_ao=False, **{name: base + k * suite.traits.stride}))[floor]))
             for k in range(16)
         ]
         out.quantities.append(at_most("CV over 16 sets", float(np.std(sets) / max(np.mean(sets), 1e-12)), 0.02))
