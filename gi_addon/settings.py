@@ -194,13 +194,8 @@ class SSDOSettings:
         higher="less noise", lower="faster",
     )  # fmt: skip
     steps: int = _setting(
-        32, "Steps", "How many of the samples lie along one ray, or on one side of one slice", low=2, high=256,
-        higher="finds thin and far things; fewer directions", lower="more directions; misses small things",
-    )  # fmt: skip
-    integrator: str = _setting(
-        "RAYS", "Integrator", "How directions are covered",
-        choices=(("RAYS", "Rays", "Cosine-distributed rays, each followed to its first hit"),
-                 ("BITMASK", "Visibility Bitmask", "Slices of the hemisphere in 32 sectors that samples fill")),
+        32, "Steps", "How many of the samples lie on one side of a slice of the hemisphere", low=2, high=256,
+        higher="finds thin and far things; fewer slices", lower="more slices; misses small things",
     )  # fmt: skip
     radius: float = _setting(
         0.0, "Radius", "How far away light is gathered from; 0 is everywhere on the screen", low=0.0, high=1e6,
