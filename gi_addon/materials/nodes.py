@@ -120,8 +120,8 @@ def principled(c: Compiler, n: Node) -> dict[str, Value]:
         r.subsurface = True
         radius = c.input(n, "Subsurface Radius", VECTOR, (1.0, 0.2, 0.1))
         scale = c.input(n, "Subsurface Scale", FLOAT, 0.05)
-        c.statement(f"principled_subsurface({out}, {base.text}, {subsurface.text}, {radius.text} * {scale.text}, {roughness.text}, "
-                    f"principled_ior({ior.text}, {level.text}));")  # fmt: skip
+        c.statement(f"principled_subsurface({out}, {base.text}, {subsurface.text}, {radius.text} * {scale.text}, "
+                    f"{roughness.text}, principled_ior({ior.text}, {level.text}));")  # fmt: skip
     coat = c.input(n, "Coat Weight", FLOAT, 0.0)
     emission = c.input(n, "Emission Color", COLOR, (1.0, 1.0, 1.0))
     strength = c.input(n, "Emission Strength", FLOAT, 0.0)
