@@ -120,7 +120,8 @@ def principled(c: Compiler, n: Node) -> dict[str, Value]:
         r.subsurface = True
         radius = c.input(n, "Subsurface Radius", VECTOR, (1.0, 0.2, 0.1))
         scale = c.input(n, "Subsurface Scale", FLOAT, 0.05)
-        c.statement(f"principled_subsurface({out}, {subsurface.text}, {radius.text} * {scale.text});")
+        c.statement(f"principled_subsurface({out}, {base.text}, {subsurface.text}, {radius.text} * {scale.text}, "
+                    f"{roughness.text}, principled_ior({ior.text}, {level.text}));")  # fmt: skip
     coat = c.input(n, "Coat Weight", FLOAT, 0.0)
     emission = c.input(n, "Emission Color", COLOR, (1.0, 1.0, 1.0))
     strength = c.input(n, "Emission Strength", FLOAT, 0.0)
@@ -265,8 +266,11 @@ def subsurface_scattering(c: Compiler, n: Node) -> dict[str, Value]:
     color = c.input(n, "Color", COLOR, (0.8, 0.8, 0.8))
     radius = c.input(n, "Radius", VECTOR, (1.0, 0.2, 0.1))
     scale = c.input(n, "Scale", FLOAT, 0.05)
+    roughness = c.input(n, "Roughness", FLOAT, 1.0)
+    ior = c.input(n, "IOR", FLOAT, 1.4)
     closure = c.variable(CLOSURE, f"closure_diffuse({color.text}, {_normal(c, n)})")
-    c.statement(f"principled_subsurface({closure.text}, 1.0, {radius.text} * {scale.text});")
+    c.statement(f"principled_subsurface({closure.text}, {color.text}, 1.0, {radius.text} * {scale.text}, "
+                f"{roughness.text}, {ior.text});")  # fmt: skip
     return {"BSSRDF": closure}
 
 
