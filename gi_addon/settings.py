@@ -12,6 +12,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 _META = "quartet"
 
 
@@ -384,6 +386,9 @@ def convert(path: str, value: Any, default: Any, meta: Meta) -> Any:
             value = float(value)
             if value != value:
                 raise ValueError
+            # Blender's numbers have 32 bits: its nearest to 0.99 is a little more, and meant to be 0.99.
+            ends = (end for end in (meta.low, meta.high) if end is not None and np.float32(end) == np.float32(value))
+            value = next(ends, value)
         else:
             value = str(value).upper() if meta.choices else str(value)
     except (TypeError, ValueError):

@@ -549,7 +549,8 @@ def resolution(suite: Suite) -> Finding:
     if not path or not has_setting(path):
         out.note = "it has no grid or map of its own"
         return out
-    sizes = (32, 64, 128, 256) if suite.full else (32, 64, 128)
+    most = next(m.high for p, _, m in walk() if p == path)
+    sizes = [n for n in ((32, 64, 128, 256) if suite.full else (32, 64, 128)) if n <= most]
     name = path.replace(".", "__")
     pairs = [_corner(suite, samples=64, **{name: n}) for n in sizes]
     gains = [float(np.nansum(i) / np.nansum(e)) for i, e in pairs]

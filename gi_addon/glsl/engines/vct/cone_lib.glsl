@@ -58,6 +58,14 @@ float cone_end(Cone cone, Grid grid)
     return min(min(far.x, min(far.y, far.z)), cone.reach);
 }
 
+// Enters the grid here: 0 where it starts within.
+float cone_begin(Cone cone, Grid grid)
+{
+    vec3 d = mix(cone.direction, vec3(1e-9), lessThan(abs(cone.direction), vec3(1e-9)));
+    vec3 near = min(-cone.start / d, (grid.size - cone.start) / d);
+    return max(max(near.x, max(near.y, near.z)), 0.0);
+}
+
 // Which level to read at `t`. A disc of diameter D varies by D/4 a side; a cell of width s, blended with its
 // neighbours, by s/2. So s = D/2.
 float cone_level(Cone cone, Grid grid, float t)
@@ -86,7 +94,7 @@ ConeResult trace_cone(sampler3D atlas, sampler3D back, sampler3D opacity, Grid g
 {
     ConeResult result = ConeResult(vec3(0.0), 1.0);
     float end = cone_end(cone, grid);
-    float t = 0.0;
+    float t = cone_begin(cone, grid);
     for (int i = 0; i < CONE_MOST_STEPS; ++i) {
         if (t >= end || result.transmittance < CONE_END) {
             break;
@@ -110,7 +118,7 @@ float trace_open(sampler3D atlas, sampler3D opacity, Grid grid, Cone cone, float
 {
     float transmittance = 1.0;
     float end = cone_end(cone, grid);
-    float t = 0.0;
+    float t = cone_begin(cone, grid);
     for (int i = 0; i < CONE_MOST_STEPS; ++i) {
         if (t >= end || transmittance < CONE_END) {
             break;
