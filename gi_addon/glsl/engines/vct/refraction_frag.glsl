@@ -56,14 +56,11 @@ void main()
     }
     Grid grid = voxel_grid();
     float spread = min(sqrt(2.0 / cone_sets) * alpha * abs(1.0 - 1.0 / medium.x), 1.0);
-    // Clear glass is not in the voxels. Tinted glass is, by what it takes; that is in `tint` already, so the cone starts clear
-    // of what its cells are blurred to.
-    vec3 start = (position_ws - grid.low) / grid.cell;
-    if (min(tint.r, min(tint.g, tint.b)) < 1.0) {
-        start += direction * (surface_reach(ng) / max(abs(dot(direction, ng)), 0.25));
-    }
-    Cone cone = Cone(start, direction, spread, 0.0, 1e30, vec3(0.0), Departure(0.0, 0.0));
-    ConeResult result = trace_cone(voxel_radiance, voxel_back, voxel_opacity, grid, cone, cone_phase());
+    // Clear glass is not in the voxels. Tinted glass is, by what it takes; that is in `tint` already, so the cone leaves it.
+    vec3 start = (position_ws - grid.low) / grid.cell + LIFT * direction;
+    float side = thickness > 1e-4 * depth ? 1.0 : -1.0; // out of the far side's front, or of a sheet's back
+    ConeResult result = trace_cone(voxel_radiance, voxel_back, voxel_sheets, voxel_kinds, grid,
+                                   Cone(start, direction, spread, 1e30, side));
     // A cone that leaves the scene knows nothing of what is there.
     if (result.transmittance < 0.5) {
         transmission_indirect = vec4(result.radiance / (1.0 - result.transmittance) * tint, 1.0);
