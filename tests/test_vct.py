@@ -83,15 +83,14 @@ def test_light_does_not_depend_on_the_shadow_maps_resolution(gl):
     assert max(means) / min(means) <= 1.02
 
 
-def test_light_hardly_depends_on_the_grids_resolution(gl):
-    """Stability test 13 asks for a drift of the mean ≤ 3 %; over 32 … 96 cells it is 4.5 %: walls look half a cell thicker
-    than they are."""
+def test_light_does_not_depend_on_the_grids_resolution(gl):
+    """Stability test 13: drift of the mean ≤ 3 % from 16 to 64 cells."""
     scene = scenes.cornell(blocks=False)
     means = [
         vct(scene, "Diffuse Indirect", samples=8, vct__resolution=r).passes["Diffuse Indirect"].mean()
-        for r in (32, 64, 96)
+        for r in (16, 32, 64)
     ]
-    assert max(means) / min(means) <= 1.05
+    assert max(means) / min(means) <= 1.03
 
 
 def test_a_uniform_enclosure_returns_its_radiance(gl):
@@ -167,16 +166,17 @@ def test_a_wall_two_cells_thick_keeps_light_out(gl, degrees):
     assert mean(0.75) <= 0.01 * mean(-0.75)
 
 
-def test_an_opaque_wall_stays_opaque_at_every_mip(gl):
-    """Its depth across is that of a whole surface in one cell of every column: transmittance e^−5."""
+def test_a_wall_covers_the_faces_of_its_cells_at_every_mip(gl):
+    """A wall across the grid covers all of its cells' faces, in the cells and in each mip: alpha 1 of the side it faces."""
     wall = np.array([[[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]]])
     b = scenes.SceneBuilder().quads(wall, scenes.diffuse((0.5,) * 3))
     b.light(scenes.sun_light((0, 1, 0), 1.0))
     scene = b.build(scenes.perspective((0, -4, 0), (0, 0, 0), 0.8))
     for level in range(3):
-        _, opacity = volume(scene, "vct.opacity", level, vct__resolution=32)
-        inner = opacity[1:-1, :, 1:-1, 1].max(axis=1)
-        assert np.exp(-5.0 * inner).max() <= 0.01
+        grid, atlas = volume(scene, "vct.radiance", level, vct__resolution=32)
+        width, depth = grid.size[0] >> level, grid.size[2] >> level
+        part = atlas[depth : 2 * depth, :, width:]  # −y
+        np.testing.assert_allclose(part[1:-1, :, 1:-1, 3].max(axis=1), 1.0, atol=1e-3)
 
 
 def test_a_wall_red_on_one_side_does_not_bleed_through(gl):
@@ -199,16 +199,17 @@ def test_a_wall_red_on_one_side_does_not_bleed_through(gl):
 
 
 def test_empty_cells_hold_nothing(gl):
-    """No light and no depth, at any mip: 0, not 0/0."""
+    """No light, at any mip: 0, not 0/0."""
     b = scenes.SceneBuilder().quads(scenes.box_quads((-1, -1, -1), (1, 1, 1)), scenes.diffuse((0.5,) * 3))
     b.light(scenes.point_light((0, -3, 0), 10.0))
     scene = b.build(scenes.perspective((0, -4, 0), (0, 0, 0), 0.8))
     for level in range(2):
-        _, opacity = volume(scene, "vct.opacity", level, vct__resolution=32)
-        _, atlas = volume(scene, "vct.radiance", level, vct__resolution=32)
-        assert np.isfinite(atlas).all() and np.isfinite(opacity).all()
-        m = opacity.shape[0] // 2
-        assert (opacity[m - 1 : m + 1, m - 1 : m + 1, m - 1 : m + 1] == 0).all()
+        grid, atlas = volume(scene, "vct.radiance", level, vct__resolution=32)
+        assert np.isfinite(atlas).all()
+        m = (grid.size[0] >> level) // 2
+        for z in range(3):
+            middle = atlas[m - 1 + z * 2 * m : m + 1 + z * 2 * m, m - 1 : m + 1]
+            assert (middle[:, :, m - 1 : m + 1] == 0).all() and (middle[:, :, 3 * m - 1 : 3 * m + 1] == 0).all()
 
 
 # --- the rest of the stability suite --------------------------------------------------------------------------------------

@@ -153,7 +153,7 @@ def build_mips(frame: Frame, planned: Planned, grid: VoxelGrid) -> None:
         for k, name in enumerate(("vct.radiance", "vct.back")):
             frame.resources[name].bind_to_image(4 + 2 * k, read=True, write=False, level=level)
             frame.resources[name].bind_to_image(5 + 2 * k, read=False, write=True, level=level + 1)
-        frame.set(program, coarse_size=size)
+        frame.set(program, coarse_size=size, coarse_level=level + 1, first_time=int(planned.stale))
         program.run(*(-(-n // 4) for n in size))
         frame.gl.ctx.memory_barrier()
 

@@ -153,7 +153,8 @@ void main()
         vec3 across = triangle_axis == 0 ? front.yzx : triangle_axis == 1 ? front.zxy : front;
         vec2 slope = across.xy / across.z;
         float height = triangle_a.z - layer - 0.5 + dot(slope, triangle_a.xy - column - 0.5);
-        float share = max(round(seen * float(VOXEL_UNITS) * opacity), 1.0);
+        // A part so small that sums round is still a plane: to a thousandth.
+        float share = max(round(seen * float(VOXEL_UNITS) * opacity), 1024.0);
         int side = across.z < 0.0 ? 1 : 0;
         uint sheet = at + 5u + 4u * uint(2 * triangle_axis + side);
         add(sheet, share);

@@ -157,7 +157,9 @@ void main()
             fronts = vec4(front, 1.0) * share;
             backs += vec4(back, 1.0) * share;
         }
-        imageStore(voxel_radiance, part_texel(cell, grid_size, part >> 1, part & 1), fronts);
+        if (fronts.a > 0.0 || first_time == 1) {
+            imageStore(voxel_radiance, part_texel(cell, grid_size, part >> 1, part & 1), fronts);
+        }
     }
     imageStore(voxel_back, cell, backs);
 }

@@ -9,12 +9,18 @@ layout(binding = 5, rgba16f) writeonly uniform image3D coarser;
 layout(binding = 6, rgba16f) readonly uniform image3D finer_back;
 layout(binding = 7, rgba16f) writeonly uniform image3D coarser_back;
 uniform ivec3 coarse_size;
+uniform int coarse_level;
 
 void main()
 {
     ivec3 cell = ivec3(gl_GlobalInvocationID);
     if (any(greaterThanEqual(cell, coarse_size))) {
         return;
+    }
+    uint kinds = kinds_of(texelFetch(voxel_kinds, cell, coarse_level));
+    kinds = kinds >= 64u ? 0u : kinds;
+    if (kinds == 0u && first_time == 0) {
+        return; // as it was
     }
     ivec3 fine_size = 2 * coarse_size;
     for (int part = 0; part < 6; ++part) {
@@ -27,7 +33,11 @@ void main()
         ivec3 front = 2 * cell + along * (1 - side);
         ivec3 behind = 2 * cell + along * side;
         vec4 light = vec4(0.0);
-        for (int column = 0; column < 4; ++column) {
+        bool there = (kinds >> part & 1u) == 1u;
+        if (!there && first_time == 0) {
+            continue;
+        }
+        for (int column = 0; column < (there ? 4 : 0); ++column) {
             ivec3 across = u * (column & 1) + v * (column >> 1);
             vec4 near = imageLoad(finer, part_texel(front + across, fine_size, axis, side));
             vec4 far = imageLoad(finer, part_texel(behind + across, fine_size, axis, side));
@@ -37,7 +47,7 @@ void main()
         imageStore(coarser, part_texel(cell, coarse_size, axis, side), light);
     }
     vec4 back = vec4(0.0);
-    for (int k = 0; k < 8; ++k) {
+    for (int k = 0; k < (kinds == 0u ? 0 : 8); ++k) {
         back += imageLoad(finer_back, 2 * cell + ivec3(k & 1, (k >> 1) & 1, k >> 2));
     }
     imageStore(coarser_back, cell, 0.125 * back);
