@@ -25,7 +25,7 @@ layout(binding = 13) uniform sampler3D bounce_back_now;
 // most (√2)²/2R = ½) and faces as the sheet does, within 60°.
 const float ON_SHEET = 0.5;
 const float FACING = 0.5;
-// A texel that shows another surface beside the point (maps coarser than squares) speaks for it if nothing else does.
+// A texel that is so near that it may show another surface beside the point speaks for it if nothing else does.
 const float BESIDE_WEIGHT = 1e-3;
 
 struct Lit {
@@ -55,21 +55,22 @@ void ask_view(int index, vec3 p, vec3 n, float covered, inout Lit front, inout L
     }
     bool on_front = dot(ray, n) < 0.0;
     vec3 out_of = on_front ? n : -n;
-    bool on_sheet = abs(dot(hit - p, n)) <= ON_SHEET * grid_cell;
+    bool on_sheet = abs(dot(hit - p, n)) <= ON_SHEET * grid_cell && dot(t.normal_ws, out_of) > FACING;
+    bool beside = !on_sheet && dot(hit - p, hit - p) <= t.area;
     bool before = dot(hit - p, ray) < 0.0;
-    if (!on_sheet && !before) {
+    if (!on_sheet && !beside && !before) {
         return;
     }
     vec4 light = vec4(0.0);
-    if (on_sheet) {
-        light = vec4(t.flux / (t.area * PI), 1.0) * (dot(t.normal_ws, out_of) > FACING ? 1.0 : BESIDE_WEIGHT);
+    if (on_sheet || beside) {
+        light = vec4(t.flux / (t.area * PI), 1.0) * (on_sheet ? 1.0 : BESIDE_WEIGHT);
         // What a lamp lights in its own cell's reach leaves past the lamp: the slit above a ceiling lamp shares its cell
         // with the room, which sees the lamp.
         if (rsm_lights[v.light].kind == LIGHT_MESH && distance(p, from) < 1.733 * grid_cell) {
             light.rgb *= 1.0 - covered;
         }
     }
-    float blocked = on_sheet ? 0.0 : 1.0;
+    float blocked = on_sheet || beside ? 0.0 : 1.0;
     if (on_front) {
         front.sum += light;
         front.blocked += blocked;
@@ -81,7 +82,7 @@ void ask_view(int index, vec3 p, vec3 n, float covered, inout Lit front, inout L
 
 vec3 lit_mean(Lit lit)
 {
-    return lit.sum.a > 0.0 ? lit.sum.rgb / (lit.sum.a + lit.blocked * (lit.sum.a < 0.5 ? BESIDE_WEIGHT : 1.0)) : vec3(0.0);
+    return lit.sum.a > 0.0 ? lit.sum.rgb / (lit.sum.a + lit.blocked) : vec3(0.0);
 }
 
 // No point of a cell, a ball of radius √3/2 cells, is in a view whose span its middle lies farther outside of.
