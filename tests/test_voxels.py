@@ -134,7 +134,7 @@ def test_no_thin_or_turned_triangle_leaves_a_hole(voxels):
     """Every cell of the 6-separating voxelization of 1000 random thin triangles is taken."""
     corners = _thin(1000, 1).astype("f4")
     grid, out, _ = voxels(_scene((triangles(corners), scenes.diffuse((0.5,) * 3))), 48)
-    taken = out["albedo"][..., 3] > 0
+    taken = out["opacity"] > 0
     local = (corners.astype("f8") - grid.low) / grid.cell
     needed = {cell for t in local for cell in crosshair_cells(t)}
     assert len(needed) > 5000
@@ -164,7 +164,7 @@ def test_a_sheet_lies_on_its_surface(voxels, degrees, tilt):
     """Every sheet of a plane is that plane, to a thousandth of a cell, in every cell it passes through."""
     mesh, n = _plane(degrees, tilt)
     grid, out, _ = voxels(_scene((mesh, scenes.diffuse((0.5,) * 3))), 32)
-    z, y, x = np.nonzero(out["albedo"][..., 3] > 0)
+    z, y, x = np.nonzero(out["opacity"] > 0)
     middle = (np.stack([x, y, z], -1) + 0.5) * grid.cell + grid.low
     sheets = out["sheets"][1][:, z, y, x] / 65535.0
     sheet = np.where(sheets[0, :, 3:] > 0, sheets[0], sheets[1])
@@ -245,7 +245,7 @@ def test_emission_and_opacity_are_those_of_the_material(voxels):
     b.quads(np.array([[[-1, 0, -1], [0, 0, -1], [0, 0, 1], [-1, 0, 1]]]), glow)
     b.quads(np.array([[[0, 0, -1], [1, 0, -1], [1, 0, 1], [0, 0, 1]]]), scenes.principled(Alpha=0.25, Base_Color=(0.5,) * 3))
     grid, out, _ = voxels(b.build(scenes.perspective((0, -6, 0), (0, 0, 0), 0.8)), 16, emission=True)
-    taken = out["albedo"][..., 3] > 0
+    taken = out["opacity"] > 0
     left = np.broadcast_to(np.arange(grid.size[0]) < 7, taken.shape) & taken
     right = np.broadcast_to(np.arange(grid.size[0]) > 8, taken.shape) & taken
     np.testing.assert_allclose(out["emission"][left][:, :3], np.tile([300, 150, 0], (left.sum(), 1)), rtol=1e-3)

@@ -255,7 +255,7 @@ class GlossyCones(Pass):
     title = "Voxel Glossy Reflections"
     figure = "Voxel Lighting Computation"
     reads = (
-        *_VOLUMES, "gbuffer.depth", "gbuffer.normal", "gbuffer.specular", "gbuffer.lobe", "brdf.energy", "brdf.average",
+        *_VOLUMES, "voxels.albedo", "gbuffer.depth", "gbuffer.normal", "gbuffer.specular", "gbuffer.lobe", "brdf.energy", "brdf.average",
     )  # fmt: skip
     writes = (
         Texture("indirect.glossy", "indirect_glossy", "radiance reflected by the glossy lobe, with its colour, W/(m²·sr)",
@@ -308,7 +308,7 @@ class RefractionCones(Pass):
     title = "Voxel Translucency"
     figure = "Voxel Lighting Computation"
     reads = (
-        *_VOLUMES, "gbuffer.transmission", "translucent.depth", "translucent.normal", "translucent.color",
+        *_VOLUMES, "voxels.albedo", "gbuffer.transmission", "translucent.depth", "translucent.normal", "translucent.color",
         "translucent.medium", "translucent.back_depth", "translucent.back_normal",
     )  # fmt: skip
     writes = (

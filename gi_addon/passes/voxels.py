@@ -25,9 +25,9 @@ from ..scene import DIFFUSE
 
 # Sums are fixed point: this many units are one cell face of area. 32 bits then hold 4096 layers of surface in one cell.
 UNITS = 1 << 20
-# Words per cell: area, area × opacity, albedo; of each of six sheets its area, slopes and height; squares covered; emission;
+# Words per cell: area, area × opacity, albedo; of each of six sheets its area, slopes and height; squares covered; diffuse share; emission;
 # area of lamps by side.
-_WORDS, _EMISSION_WORDS, _LAMP_WORDS = 32, 3, 6
+_WORDS, _EMISSION_WORDS, _LAMP_WORDS = 33, 3, 6
 # For the sums of the layers that are made at once; OpenGL 4.3 promises storage blocks of no more than 128 MiB.
 _SLAB_BYTES = 128 * MIB
 
@@ -111,7 +111,7 @@ class Voxelisation(Pass):
         Texture("voxels.kinds", "voxel_kinds", "a bit for each kind of sheet in the cell or, in an empty one, 64 + level of the "
                 "largest empty block around it, over 255; mean opacity", "rg8", _size,
                 mips=lambda f: voxel_grid(f).levels, scratch=True),
-        Texture("voxels.albedo", "voxel_albedo", "mean share of light that the surfaces reflect; 1 where there are any",
+        Texture("voxels.albedo", "voxel_albedo", "mean share of light that the surfaces reflect; how much of it is diffuse",
                 "rgba8", _size),
         Texture("voxels.emission", "voxel_emission", "mean emitted radiance, W/(m²·sr)", "rgba16f", _size,
                 when=lambda f: None if f.glowing_voxels else "no voxel shines: nothing emits, or lights sampled on it do"),

@@ -29,17 +29,17 @@ void main()
     imageStore(voxel_kinds, cell, vec4(float(kinds) / 255.0, opaque / max(weight, 1.0), 0.0, 0.0));
 #if HAS_VOXEL_ALBEDO
     vec3 albedo = vec3(voxel_sums[first + 2u], voxel_sums[first + 3u], voxel_sums[first + 4u]) * color;
-    imageStore(voxel_albedo, cell, vec4(min(albedo, vec3(1.0)), weight > 0.0 ? 1.0 : 0.0));
+    imageStore(voxel_albedo, cell, vec4(min(albedo, vec3(1.0)), float(voxel_sums[first + 32u]) / max(weight, 1.0)));
 #endif
 #if HAS_VOXEL_EMISSION
-    vec3 emission = vec3(voxel_sums[first + 32u], voxel_sums[first + 33u], voxel_sums[first + 34u]);
+    vec3 emission = vec3(voxel_sums[first + 33u], voxel_sums[first + 34u], voxel_sums[first + 35u]);
     imageStore(voxel_emission, cell, vec4(emission * (emission_unit * float(VOXEL_UNITS) * color), 0.0));
 #endif
 #if HAS_VOXEL_LAMPS
     vec3 lamps = vec3(0.0);
     for (int axis = 0; axis < 3; ++axis) {
         // A lamp with two sides covers what one of them does.
-        lamps[axis] = float(max(voxel_sums[first + 32u + 2u * uint(axis)], voxel_sums[first + 33u + 2u * uint(axis)]));
+        lamps[axis] = float(max(voxel_sums[first + 33u + 2u * uint(axis)], voxel_sums[first + 34u + 2u * uint(axis)]));
     }
     imageStore(voxel_lamps, cell, vec4(min(lamps / float(VOXEL_UNITS), vec3(1.0)), 0.0));
 #endif

@@ -94,9 +94,11 @@ void main()
     Closure c = surface_closure(point);
     float opacity = surface_opacity(c);
     vec3 albedo = c.diffuse;
+    float diffuse = luminance(c.diffuse);
 #if SURFACE_TABLES > 0
     albedo += lobe_albedo_average(brdf_average, brdf_energy, closure_lobe(c));
 #endif
+    diffuse /= max(luminance(albedo), 1e-6);
     albedo = saturate(albedo); // more than all light reflected would not settle
 
     // The triangle inside this column.
@@ -149,6 +151,7 @@ void main()
         add(at + 2u, weight * albedo.r);
         add(at + 3u, weight * albedo.g);
         add(at + 4u, weight * albedo.b);
+        add(at + 32u, weight * diffuse);
         // The plane as a height over the cell's middle: along the axis, x + slope · (u, v) = height.
         vec3 across = triangle_axis == 0 ? front.yzx : triangle_axis == 1 ? front.zxy : front;
         vec2 slope = across.xy / across.z;
@@ -164,12 +167,12 @@ void main()
         atomicOr(voxel_sums[at + 29u + uint(triangle_axis)], squares_covered(part, corners, column) << (16 * side));
 #if VOXEL_EMISSION
         float scale = weight / (float(VOXEL_UNITS) * emission_unit);
-        add(at + 32u, c.emission.r * scale);
-        add(at + 33u, c.emission.g * scale);
-        add(at + 34u, c.emission.b * scale);
+        add(at + 33u, c.emission.r * scale);
+        add(at + 34u, c.emission.g * scale);
+        add(at + 35u, c.emission.b * scale);
 #elif VOXEL_LAMPS
         if (max3(c.emission) > 0.0) {
-            add(at + 32u + uint(2 * triangle_axis + side), seen * float(VOXEL_UNITS));
+            add(at + 33u + uint(2 * triangle_axis + side), seen * float(VOXEL_UNITS));
         }
 #endif
     }

@@ -12,9 +12,22 @@
 
 #include "engines/vct/volume_lib.glsl"
 
+// Where a ray meets a sheet.
+struct Meeting {
+    float t;        // cells; 1e30 where there is none
+    int part;
+    bool front;
+    ivec3 cell;
+    vec3 normal;    // of the side that is met
+    float opacity;
+};
+
+const Meeting NOTHING_MET = Meeting(1e30, 0, true, ivec3(0), vec3(0.0), 0.0);
+
 struct ConeResult {
     vec3 radiance;        // that arrives along the cone, W/(m²·sr)
     float transmittance;  // share of the cone that nothing blocks
+    Meeting first;
 };
 
 // Below this nothing behind changes a picture: 1/1000.
@@ -38,13 +51,6 @@ struct Cone {
     float spread;
     float reach;
     float leaving;
-};
-
-// Where a ray meets a sheet, over `part`.
-struct Meeting {
-    float t;     // cells; beyond the cell where there is none
-    int part;
-    bool front;
 };
 
 // The tangent of the half angle of a cone whose projected solid angle is `share` of the hemisphere's π: sin²θ = share.
@@ -90,7 +96,7 @@ float cone_end(Cone cone, Grid grid)
 // The first sheet in a cell that the ray meets between `t` and `t_out`.
 Meeting first_sheet(sampler3D sheets, Cone cone, ivec3 cell, ivec3 size, uint kinds, float t, float t_out)
 {
-    Meeting first = Meeting(1e30, 0, true);
+    Meeting first = NOTHING_MET;
     vec3 from = cone.start - vec3(cell) - 0.5;
     for (int part = 0; part < 6; ++part) {
         if ((kinds >> part & 1u) == 0u) {
@@ -116,7 +122,7 @@ Meeting first_sheet(sampler3D sheets, Cone cone, ivec3 cell, ivec3 size, uint ki
         vec2 uv = across_axis(from + cone.direction * at, part >> 1);
         ivec2 square = clamp(ivec2(floor((uv + 0.5) * 4.0)), ivec2(0), ivec2(3));
         if (at < first.t && (sheet.squares >> (square.x + 4 * square.y) & 1u) == 1u) {
-            first = Meeting(at, part, front);
+            first = Meeting(at, part, front, cell, normalize(sheet.slant) * (front ? sign_ : -sign_), 0.0);
         }
     }
     return first;
@@ -131,16 +137,14 @@ vec3 leaving_light(sampler3D atlas, sampler3D back, Grid grid, Cone cone, Meetin
     return light.a > 0.0 ? light.rgb / light.a : vec3(0.0);
 }
 
-// The next sheet on the ray's way from `t` on; `t` ends behind its cell. `opacity` is the cell's. False where there is none.
-bool next_sheet(sampler3D sheets, sampler3D kinds, Grid grid, Cone cone, float end, inout float t, out Meeting met,
-                out float opacity)
+// The next sheet on the ray's way from `t` to `end`; `t` ends behind its cell.
+Meeting next_sheet(sampler3D sheets, sampler3D kinds, Grid grid, Cone cone, float end, inout float t)
 {
     vec3 d = mix(cone.direction, vec3(1e-6), lessThan(abs(cone.direction), vec3(1e-6)));
     vec3 inverse = 1.0 / d;
     vec3 forward = step(0.0, d);
     ivec3 size = ivec3(grid.size);
-    met = Meeting(1e30, 0, true);
-    opacity = 0.0;
+    Meeting met = NOTHING_MET;
     for (int i = 0; i < CONE_MOST_STEPS; ++i) {
         if (t >= end || met.t < end) {
             break;
@@ -154,26 +158,28 @@ bool next_sheet(sampler3D sheets, sampler3D kinds, Grid grid, Cone cone, float e
         float t_out = t + max(min(out_at.x, min(out_at.y, out_at.z)), 0.0);
         if (found < 64u) {
             met = first_sheet(sheets, cone, cell, size, found, t, min(t_out, end));
-            opacity = texel.g;
+            met.opacity = texel.g;
         }
         t = t_out + 1e-3;
     }
-    return met.t < end;
+    return met;
 }
 
 ConeResult trace_cone(sampler3D atlas, sampler3D back, sampler3D sheets, sampler3D kinds, Grid grid, Cone cone)
 {
-    ConeResult result = ConeResult(vec3(0.0), 1.0);
+    ConeResult result = ConeResult(vec3(0.0), 1.0, NOTHING_MET);
     float end = cone_end(cone, grid);
     float t = 0.0;
     for (int layer = 0; layer < CONE_MOST_LAYERS; ++layer) {
-        Meeting met;
-        float opacity;
-        if (result.transmittance < CONE_END || !next_sheet(sheets, kinds, grid, cone, end, t, met, opacity)) {
+        if (t >= end || result.transmittance < CONE_END) {
             break;
         }
-        result.radiance += result.transmittance * opacity * leaving_light(atlas, back, grid, cone, met);
-        result.transmittance *= 1.0 - opacity;
+        Meeting met = next_sheet(sheets, kinds, grid, cone, end, t);
+        if (met.t < end) {
+            result.radiance += result.transmittance * met.opacity * leaving_light(atlas, back, grid, cone, met);
+            result.transmittance *= 1.0 - met.opacity;
+            result.first = layer == 0 ? met : result.first;
+        }
     }
     return result;
 }
@@ -185,12 +191,10 @@ float trace_open(sampler3D sheets, sampler3D kinds, Grid grid, Cone cone)
     float end = cone_end(cone, grid);
     float t = 0.0;
     for (int layer = 0; layer < CONE_MOST_LAYERS; ++layer) {
-        Meeting met;
-        float opacity;
-        if (transmittance < CONE_END || !next_sheet(sheets, kinds, grid, cone, end, t, met, opacity)) {
+        if (t >= end || transmittance < CONE_END) {
             break;
         }
-        transmittance *= 1.0 - opacity;
+        transmittance *= 1.0 - next_sheet(sheets, kinds, grid, cone, end, t).opacity;
     }
     return transmittance;
 }

@@ -8,7 +8,7 @@
 #include "lib/view_lib.glsl"
 #include "lib/sequence_lib.glsl"
 #include "lib/bsdf_lib.glsl"
-#include "engines/vct/diffuse_lib.glsl"
+#include "engines/vct/seen_lib.glsl"
 
 void main()
 {
@@ -40,7 +40,7 @@ void main()
     }
     float spread = min(2.0 * sqrt(2.0 / cone_sets) * alpha, 1.0);
     Cone cone = surface_cone(voxel_grid(), position_ws, ng, l, spread, 1e30);
-    ConeResult result = trace_cone(voxel_radiance, voxel_back, voxel_sheets, voxel_kinds, voxel_grid(), cone);
+    ConeResult result = trace_seen(voxel_grid(), cone);
     float lambda_v = ggx_lambda(v_local.z, alpha);
     float shadowing = (1.0 + lambda_v) / (1.0 + lambda_v + ggx_lambda(l_local.z, alpha));
     vec3 gain = multiscatter_gain(brdf_energy, brdf_average, lobe, v_local.z);

@@ -9,7 +9,7 @@
 #include "lib/view_lib.glsl"
 #include "lib/sequence_lib.glsl"
 #include "lib/bsdf_lib.glsl"
-#include "engines/vct/diffuse_lib.glsl"
+#include "engines/vct/seen_lib.glsl"
 
 void main()
 {
@@ -59,8 +59,7 @@ void main()
     // Clear glass is not in the voxels. Tinted glass is, by what it takes; that is in `tint` already, so the cone leaves it.
     vec3 start = (position_ws - grid.low) / grid.cell + LIFT * direction;
     float side = thickness > 1e-4 * depth ? 1.0 : -1.0; // out of the far side's front, or of a sheet's back
-    ConeResult result = trace_cone(voxel_radiance, voxel_back, voxel_sheets, voxel_kinds, grid,
-                                   Cone(start, direction, spread, 1e30, side));
+    ConeResult result = trace_seen(grid, Cone(start, direction, spread, 1e30, side));
     // A cone that leaves the scene knows nothing of what is there.
     if (result.transmittance < 0.5) {
         transmission_indirect = vec4(result.radiance / (1.0 - result.transmittance) * tint, 1.0);
