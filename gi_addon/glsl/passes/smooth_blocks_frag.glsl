@@ -17,6 +17,8 @@ vec3 block_position(ivec2 block, float depth)
     return position_ws_from_depth((vec2(pixel) + 0.5) * view.inverse_resolution, depth);
 }
 
+bool near_enough(ivec2 other, vec3 p, float d, float r) { return distance(block_position(other,d), p) <= min(r, texelFetch(raw_indirect, other, 0).a); }
+
 void main()
 {
     ivec2 block = ivec2(gl_FragCoord.xy);
@@ -43,7 +45,7 @@ void main()
             other = clamp(other, ivec2(0), last);
             float other_depth = texelFetch(low_depth, other, 0).r;
             if (other_depth > 0.0 && w > 0.0 && dot(octahedral_decode(texelFetch(low_normal, other, 0).zw), ng) >= SAME_FACING &&
-                abs(dot(block_position(other, other_depth) - position_ws, ng)) <= off_plane) {
+                abs(dot(block_position(other, other_depth) - position_ws, ng)) <= off_plane && near_enough(other, position_ws, other_depth, low_indirect.a)) {
                 light += w * texelFetch(raw_indirect, other, 0);
                 direction += w * texelFetch(raw_direction, other, 0);
                 weight += w;

@@ -12,6 +12,7 @@ Grid voxel_grid() { return Grid(grid_low, grid_cell, vec3(grid_size), grid_level
 struct Gathered {
     vec3 radiance;    // E/π, W/(m²·sr)
     vec4 direction;   // Σ luminance × direction; Σ luminance, per direction
+    float distance_;  // harmonic mean of how far the surfaces are that it comes from, m
 };
 
 // The cone that leaves a surface at `position_ws` along `direction`, `reach` m far.
@@ -34,7 +35,7 @@ float set_spread() { return cone_spread(1.0 / (float(cone_count) * cone_sets)); 
 
 Gathered gather_cones(vec3 position_ws, vec3 n, vec3 ng)
 {
-    Gathered g = Gathered(vec3(0.0), vec4(0.0));
+    Gathered g = Gathered(vec3(0.0), vec4(0.0), 0.0);
     Grid grid = voxel_grid();
     mat3 frame = frame_from_normal(n);
     float spread = set_spread();
@@ -48,8 +49,10 @@ Gathered gather_cones(vec3 position_ws, vec3 n, vec3 ng)
         }
         ConeResult result = trace_cone(voxel_radiance, voxel_back, voxel_sheets, voxel_kinds, grid, cone);
         g.radiance += result.radiance;
+        g.distance_ += 1.0 / max(result.first.t, LIFT);
         g.direction += vec4(cone.direction, 1.0) * (luminance(result.radiance) / max(local.z, spread));
     }
     g.radiance /= float(cone_count);
+    g.distance_ = grid.cell * float(cone_count) / max(g.distance_, 1e-20);
     return g;
 }

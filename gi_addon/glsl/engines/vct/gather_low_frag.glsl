@@ -18,6 +18,6 @@ void main()
     vec4 normals = texelFetch(low_normal, block, 0);
     Gathered g = gather_cones(position_ws_from_depth(uv, depth), octahedral_decode(normals.xy),
                               octahedral_decode(normals.zw));
-    raw_indirect = vec4(g.radiance, 1.0);
+    raw_indirect = vec4(g.radiance, g.distance_);
     raw_direction = g.direction;
 }
