@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import atexit
 import contextlib
 import json
 import sys
@@ -93,14 +92,14 @@ def render_command(scene, technique, samples, resolution, frame, assignments, pa
         written = result.passes
     else:
         with _blender(scene, technique, samples, resolution, frame, assignments) as bscene:
-            from .host import cycles, engine
+            from .host import cycles, embedded, engine
 
             bscene.render.engine = "QUARTET"
             with _progress("Rendering") as progress:
                 engine.listeners.append(progress)
                 try:
                     if output.suffix.lower() == ".png":
-                        _render_png(bscene, output)
+                        embedded.render_png(bscene, output)
                         console.print(f"wrote {output}")
                         return
                     written = cycles.render_passes(bscene, names)
@@ -117,22 +116,6 @@ def render_command(scene, technique, samples, resolution, frame, assignments, pa
     console.print(f"wrote {output}")
 
 
-def _render_png(scene, output: Path) -> None:
-    """Through Blender's own writer, so that the scene's view transform applies."""
-    import bpy
-
-    from .host import cycles
-
-    image = scene.render.image_settings
-    if hasattr(image, "media_type"):
-        image.media_type = "IMAGE"
-    image.file_format, image.color_mode = "PNG", "RGBA" if scene.render.film_transparent else "RGB"
-    scene.render.filepath = str(output.resolve().with_suffix(""))
-    scene.render.use_file_extension = True
-    with cycles.quiet():
-        bpy.ops.render.render(write_still=True, scene=scene.name)
-
-
 @main.command("snapshot")
 @click.argument("scene", type=click.Path(path_type=Path))
 @click.option("--frame", type=int, help="Animation frame.")
@@ -142,7 +125,9 @@ def snapshot_command(scene, frame, resolution, output) -> None:
     """Write what Quartet sees of SCENE as a .npz that renders identically without Blender."""
     output = output or scene.with_suffix(".npz")
     with _blender(scene, None, None, resolution, frame, ()) as bscene:
-        plain, resolution = _sync(bscene)
+        from .host import embedded
+
+        plain, resolution = embedded.plain(bscene)
         plain.save(output)
     console.print(f"wrote {output}: {plain.triangle_count()} triangles, for {resolution[0]}x{resolution[1]}")
 
@@ -170,9 +155,9 @@ def inspect_command(
         settings = _settings(Settings(), technique, samples, assignments)
     else:
         with _blender(scene, technique, samples, resolution, frame, assignments) as bscene:
-            from .host import properties
+            from .host import embedded, properties
 
-            plain, resolution = _sync(bscene)
+            plain, resolution = embedded.plain(bscene)
             settings = properties.read(bscene)
     plan = inspect(plain, settings, names, resolution=resolution)
     click.echo(plan.graph_text() if dot else plan.text())
@@ -186,16 +171,20 @@ def inspect_command(
 @click.option("--sweep", type=click.Choice(("none", "samples", "quick", "full")),
               help="How many settings of each technique to try.")
 @click.option("--peers", default="", help="Rivals in the same run: cycles, eevee, or both separated by a comma.")
+@click.option("--blender", metavar="PROGRAM",
+              help="The Blender that EEVEE runs in; $QUARTET_BLENDER or 'blender' on the path if none is given.")
 @click.option("--effects", is_flag=True, help="The paper's Table 1 with numbers, on scenes made for each effect.")
 @click.option("--references", "references_folder", type=click.Path(path_type=Path, exists=True, file_okay=False),
               help="Folder of ready references, SCENE.npz; scenes that it lacks are rendered with Cycles.")
 @click.option("--reference-samples", default=256, show_default=True, help="Cycles samples per half.")
 @click.option("--visits", type=click.IntRange(1, 2), default=2, show_default=True,
               help="1 measures each candidate once; 2 goes there and back, so that a machine's drift shows.")
+@click.option("--budget", type=click.FloatRange(0.0), default=60.0, show_default=True,
+              help="Seconds of timed frames per candidate and visit: slow ones get fewer frames, as the report says.")
 @click.option("-o", "--output", type=click.Path(path_type=Path), default=Path("quartet-compare"), show_default=True,
               help="Folder for the report, sheets and results.json.")
 def compare_command(
-    scenes, techniques, sweep, peers, effects, references_folder, reference_samples, visits, output, **options
+    scenes, techniques, sweep, peers, blender, effects, references_folder, reference_samples, visits, budget, output, **options
 ) -> None:
     """Render SCENES with Quartet and with unbiased Cycles (R1 and R∞, cached) and state the error per pass.
 
@@ -206,7 +195,8 @@ def compare_command(
         raise click.UsageError("name a scene file, builtin:NAME, or --effects")
     if effects or len(scenes) > 1 or techniques or sweep or peers or references_folder:
         report_command(
-            scenes, techniques, sweep or "none", peers, effects, references_folder, reference_samples, visits, output, options
+            scenes, techniques, sweep or "none", peers, blender, effects, references_folder, reference_samples, visits, budget,
+            output, options,
         )
     else:
         _sheet(scenes[0], reference_samples=reference_samples, output=output, **options)
@@ -220,9 +210,9 @@ def _sheet(scene, technique, samples, resolution, frame, assignments, reference_
     from .compare.study import COMPARED
 
     with _blender(scene, technique, samples, resolution or (320, 180), frame, assignments) as bscene:
-        from .host import cycles, engine, properties
+        from .host import cycles, embedded, engine, properties
 
-        plain, size = _sync(bscene)
+        plain, size = embedded.plain(bscene)
         key = plain.digest()
 
         def run_cycles(bounces: int, count: int, seed: int) -> dict[str, np.ndarray]:
@@ -308,48 +298,15 @@ def _settings(settings: Settings, technique, samples, assignments) -> Settings:
 def _blender(scene: Path, technique, samples, resolution, frame, assignments) -> Iterator:
     """The scene file open in the embedded Blender, with the options applied."""
     try:
-        import bpy
+        from .host import embedded, properties
     except ImportError as error:
         raise click.ClickException(
             "this needs Blender as a Python module: pip install 'quartet-gi[bpy]', or give a snapshot (.npz)"
         ) from error
-    from . import register, unregister
-    from .host import files, properties
-
-    if not hasattr(bpy.types.Scene, "quartet"):
-        register()
-        # A registered engine left behind makes Blender 4.5 hang when the process ends.
-        atexit.register(lambda: hasattr(bpy.types.Scene, "quartet") and unregister())
-    if str(scene).startswith("builtin:"):
-        from .compare.scenes import BUILTIN
-        from .host.build import build
-
-        name = str(scene).removeprefix("builtin:")
-        if name not in BUILTIN:
-            raise click.UsageError(f"no scene builtin:{name}; there are {', '.join(BUILTIN)}")
-        bscene, notes = build(BUILTIN[name]()), []
-    else:
-        bscene, notes = files.load(scene)
-    if resolution:
-        bscene.render.resolution_x, bscene.render.resolution_y = resolution
-        bscene.render.resolution_percentage = 100
-    bscene.render.use_border = False
-    if frame is not None:
-        bscene.frame_set(frame)
+    bscene, notes = embedded.open_scene(scene, frame, resolution)
     properties.write(bscene, _settings(properties.read(bscene), technique, samples, assignments))
     _notes(notes)
     yield bscene
-
-
-def _sync(bscene) -> tuple[Scene, tuple[int, int]]:
-    """The plain scene of a Blender scene, and its picture's size."""
-    import bpy
-
-    from .host.engine import picture
-    from .host.sync import SceneSync
-
-    size, _ = picture(bscene.render)
-    return SceneSync().read(bpy.context.evaluated_depsgraph_get(), resolution=size), size
 
 
 @contextlib.contextmanager

@@ -40,7 +40,10 @@ def technique_names(text: str | None) -> list[str]:
     help="Folder for stability.html and stability.json.",
 )
 def stability_command(techniques, tests, full, strict, output) -> None:
-    """Run the stability suite: value, limit and verdict of every test for every technique."""
+    """Run the stability suite: value, limit and verdict of every test for every technique.
+
+    An interrupted run goes on where it stopped.
+    """
     from .compare import stability, stability_checks  # noqa: F401 — the second fills the registry
 
     names = technique_names(techniques)
@@ -52,9 +55,10 @@ def stability_command(techniques, tests, full, strict, output) -> None:
     def said(technique: str, test: stability.Test, finding: stability.Finding) -> None:
         missed = next((q for q in finding.quantities if q.limited and not q.holds), None)
         detail = f"{missed.name} = {missed.value:.4g}, limit {missed.limit}" if missed else finding.note
-        console.print(f"{technique:5s} {test.key:>3s} {test.title:26s} {finding.verdict:14s} {detail}", highlight=False)
+        head = f"{technique:5s} {test.key:>3s} {test.title:26s} {finding.verdict:14s} {finding.seconds:5.0f} s"
+        console.print(f"{head}  {detail}", highlight=False)
 
-    results = stability.run(names, keys, full=full, progress=said)
+    results = stability.run(names, keys, full=full, cache=output / "findings", progress=said)
     table = Table("test", *names)
     for key in keys:
         table.add_row(f"{key} {stability.TESTS[key].title}", *(results[t][key].verdict for t in names))
@@ -76,6 +80,13 @@ def stability_command(techniques, tests, full, strict, output) -> None:
 @click.option("--rows", help="Only rows whose name holds this text, e.g. '512²' or '1280x720'.")
 @click.option("--limit", type=float, default=60.0, show_default=True, help="Skip a row whose first frame takes longer, s.")
 @click.option(
+    "--budget",
+    type=click.FloatRange(0.0),
+    default=60.0,
+    show_default=True,
+    help="Seconds of timed frames per row, there and back each: slow rows get fewer frames, as the table says.",
+)
+@click.option(
     "-o",
     "--output",
     type=click.Path(path_type=Path),
@@ -83,8 +94,11 @@ def stability_command(techniques, tests, full, strict, output) -> None:
     show_default=True,
     help="Folder for bench.html, bench.json and bench.csv.",
 )
-def bench_command(scene, techniques, scale, frames, rows, limit, output) -> None:
-    """The paper's Table 2 on this machine: frame rates of SCENE (Sponza, as there; a Cornell box if none is given)."""
+def bench_command(scene, techniques, scale, frames, rows, limit, budget, output) -> None:
+    """The paper's Table 2 on this machine: frame rates of SCENE (Sponza, as there; a Cornell box if none is given).
+
+    An interrupted bench goes on where it stopped.
+    """
     from .compare import bench, scenes
     from .compare.paper import TABLE_2
     from .gl import shared
@@ -99,10 +113,12 @@ def bench_command(scene, techniques, scale, frames, rows, limit, output) -> None
     elif scene.suffix.lower() == ".npz":
         plain, label = Scene.load(scene), scene.name
     else:
-        from .cli import _blender, _sync
+        from .cli import _blender
 
         with _blender(scene, None, None, (1280, 720), None, ()) as bscene:
-            (plain, _), label = _sync(bscene), scene.name
+            from .host import embedded
+
+            (plain, _), label = embedded.plain(bscene), scene.name
     scale = scale or (0.1 if shared().call(lambda gl: gl.software) else 1.0)
     calibration, timings = bench.bench(
         plain,
@@ -111,18 +127,22 @@ def bench_command(scene, techniques, scale, frames, rows, limit, output) -> None
         frames=frames,
         rows=chosen,
         limit_s=limit,
+        budget_s=budget,
+        cache=output / "rows",
         progress=lambda text: console.print(text, style="dim", highlight=False),
     )
     table = Table(
-        "technique", "setting", "paper", "paper fps", "here", "ms moving", "ms still", "fps", "× paper", "per hardware", "MiB"
+        *("technique", "setting", "paper", "paper fps", "here"),
+        *("ms moving", "frames", "ms still", "fps", "× paper", "per hardware", "MiB"),
     )
     for r in bench.records(calibration, timings):
         paper_fps = "–" if r["paper_fps"] is None else f"{r['paper_fps']:g}{'?' if r['paper_doubtful'] else ''}"
         numbers = (
-            [r["problem"], *[""] * 5]
+            [r["problem"], *[""] * 6]
             if r["problem"]
             else [
                 f"{r['ms']:.2f} ± {r['mad']:.2f}",
+                str(r["frames"]),
                 f"{r['still_ms']:.2f}",
                 f"{r['fps']:.1f}",
                 f"{r['ratio']:.3g}" if r["ratio"] else "–",
@@ -138,14 +158,14 @@ def bench_command(scene, techniques, scale, frames, rows, limit, output) -> None
 
 
 def report_command(
-    scenes, techniques, sweep, peers, effects, references_folder, reference_samples, visits, output, options
+    scenes, techniques, sweep, peers, blender, effects, references_folder, reference_samples, visits, budget, output, options
 ) -> None:
     """Measure scenes with all candidates and write the report. ``options`` are the scene options of the command line."""
-    from .cli import _blender, _sync
-    from .compare import report, study
+    from .cli import _blender
+    from .compare import bench, report, study
     from .compare.references import BOUNCES, ready, reference
     from .compare.sweeps import peer_sweep, technique_sweep
-    from .gl import driver
+    from .gl import driver, shared
 
     names = technique_names(techniques) if techniques or not options["technique"] else technique_names(options["technique"])
     rivals = [p.strip().lower() for p in peers.split(",") if p.strip()]
@@ -156,13 +176,15 @@ def report_command(
     candidates = [c for t in names for c in technique_sweep(t, sweep)] + [c for p in rivals for c in peer_sweep(p, sweep)]
     size = options["resolution"] or (128, 72)
     measured = []
+    calibration = shared().call(bench.calibrate)
+    console.print(bench.hardware_text(calibration), highlight=False)
     for scene in scenes:
         arguments = (None, options["samples"], size, options["frame"], options["assignments"])
         with _blender(scene, *arguments) as bscene:
-            from .host import cycles, properties
+            from .host import cycles, eevee, embedded, properties
             from .host import peers as host_peers
 
-            plain, size = _sync(bscene)
+            plain, size = embedded.plain(bscene)
             key, base = plain.digest(), properties.read(bscene)
             label = scene.name
 
@@ -181,10 +203,17 @@ def report_command(
 
             def run_peer(candidate, passes, bscene=bscene):
                 if candidate.method == "EEVEE":
-                    return eevee.render(candidate, passes)
+                    return other.render(candidate, passes)
                 return host_peers.render(bscene, candidate, passes)
 
-            with host_peers.Eevee(str(scene), size, options["frame"]) as eevee:
+            try:
+                program = eevee.program(blender) if "eevee" in rivals else None
+            except RuntimeError as error:
+                raise click.UsageError(f"--blender: {error}") from error
+            with eevee.Eevee(bscene, program) as other:
+                versions = dict.fromkeys(("Cycles", "Cycles + OIDN"), host_peers.VERSION)
+                if "eevee" in rivals:
+                    versions["EEVEE"] = other.version
                 runs = study.measure(
                     plain,
                     key,
@@ -194,13 +223,18 @@ def report_command(
                     driver=driver(),
                     cache=output / "runs",
                     peer=run_peer,
-                    peer_version=host_peers.VERSION,
+                    peer_versions=versions,
                     visits=visits,
+                    repeats=3 if visits > 1 else 5,
+                    budget_s=budget,
                     progress=lambda text, label=label: console.print(f"{label}: {text}", style="dim", highlight=False),
                 )
+        console.print(f"{label}: scores")
         record = study.scene_record(label, key, size, samples, runs, references, plain.triangle_count())
+        record["peers"] = {m: v for m, v in versions.items() if any(r.candidate.method == m for r in runs)}
         measured.append(report.Measured(record, runs, references))
     head = {"version": study.source_version(), "driver": driver(), "date": datetime.date.today().isoformat(), "sweep": sweep}
+    head["calibration"] = bench.hardware_text(calibration)
     extra = ""
     if effects:
         from .compare import effects as table_1
@@ -221,12 +255,11 @@ def report_command(
 
 def certify_command(scene: Path, bscene, reference_samples: int) -> None:
     """Print the certificate of a scene that is open in Blender."""
-    from .cli import _sync
     from .compare.certificate import certify
     from .compare.references import reference
-    from .host import cycles, properties
+    from .host import cycles, embedded, properties
 
-    plain, size = _sync(bscene)
+    plain, size = embedded.plain(bscene)
     settings = properties.read(bscene)
     kind = "R1" if settings.bounces <= 1 else "Rinf"
 

@@ -70,6 +70,29 @@ def test_a_row_that_cannot_run_says_why_and_others_go_on(gl):
     assert "over the limit" in slow.problem
 
 
+def test_an_interrupted_bench_goes_on_where_it_stopped(gl, tmp_path):
+    """What is measured is read back; a row added to it is measured; another limit looks again."""
+    other = Row("RSM", "64², 12 samples", (("rsm.resolution", 64), ("rsm.samples", 12)), HD, 1)
+    options = {"techniques": ["RSM"], "scale": 0.02, "frames": 2, "cache": tmp_path}
+    said = []
+    _, (first,) = bench.bench(scenes.cornell(), rows=[SMALL], progress=said.append, **options)
+    assert len(said) == 2 and first.visits == 2 and len(first.moving) == 2
+    _, (again, added) = bench.bench(scenes.cornell(), rows=[SMALL, other], progress=said.append, **options)
+    assert len(said) == 4 and again.moving == first.moving and again.passes == first.passes and len(added.moving) == 2
+    _, (slow,) = bench.bench(scenes.corner(), rows=[SMALL], limit_s=0.0, progress=said.append, **options)
+    assert "over the limit" in slow.problem and len(said) == 5, "another scene is another result"
+    _, (slow,) = bench.bench(scenes.corner(), rows=[SMALL], limit_s=0.0, progress=said.append, **options)
+    assert "over the limit" in slow.problem and len(said) == 5, "its first frame is known"
+    _, (quick,) = bench.bench(scenes.corner(), rows=[SMALL], progress=said.append, **options)
+    assert not quick.problem and len(quick.moving) == 2
+
+
+def test_a_budget_bounds_the_frames_and_is_said(gl):
+    _, (timing,) = bench.bench(scenes.cornell(), techniques=["RSM"], scale=0.02, frames=40, rows=[SMALL], budget_s=0.0)
+    (record,) = bench.records(bench.Calibration(1.0, 0.01, 5, 646.27, 25.6), [timing])
+    assert record["frames"] == len(timing.moving) == 2 and record["still_frames"] == 2, "one there, one back"
+
+
 def test_the_calibration_kernel_counts_and_copies(gl):
     """It moves the data it says it moves, and reports a rate that follows from its time."""
     c = gl(lambda g: bench.calibrate(g, invocations=1 << 12, most=6))

@@ -5,13 +5,16 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import re
 import shutil
 import subprocess
+import sys
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from conftest import ROOT
 
 from gi_addon.compare import certificate, charts, effects, page, references, report, scenes, study, sweeps
 from gi_addon.compare.metrics import score
@@ -130,6 +133,85 @@ def test_an_interrupted_sweep_goes_on_where_it_stopped(gl, tmp_path, monkeypatch
         path.write_bytes(b"damaged")
     study.measure(scene, "key", (32, 18), candidates[:1], **options)
     assert len(rendered) == 9
+
+
+def test_a_result_has_the_same_name_in_every_process(tmp_path):
+    """Python hashes text differently in each process: no name may depend on that, or a sweep would never be resumed."""
+    code = (
+        "from gi_addon.compare import scenes, study, sweeps\n"
+        "from gi_addon.settings import Settings\n"
+        "for name in ('cornell', 'effect-glossy'):\n"
+        "    key = scenes.BUILTIN[name]().digest()\n"
+        "    for c in sweeps.technique_sweep('VCT', 'quick') + sweeps.peer_sweep('cycles', 'quick'):\n"
+        "        chosen = None if c.peer else c.settings(Settings())\n"
+        "        print(study.run_key(key, (32, 18), c, chosen, 'driver', study.source_version()))\n"
+    )
+    said = [
+        subprocess.run(
+            [sys.executable, "-c", code],
+            capture_output=True,
+            text=True,
+            check=True,
+            cwd=ROOT,
+            env={**os.environ, "PYTHONHASHSEED": seed},
+        ).stdout
+        for seed in ("1", "2")
+    ]
+    assert said[0] == said[1] and len(set(said[0].split())) == len(said[0].split()) > 20
+
+
+def test_scores_are_kept_beside_their_run(gl, tmp_path, monkeypatch):
+    """They are read back for the same references only."""
+    scene, size = scenes.cornell(), (32, 18)
+    (run,) = study.measure(
+        scene, "key", size, [Candidate("RSM", (("samples", 1),))], base=Settings(), driver="test", cache=tmp_path, repeats=1
+    )
+    noisy = {n: (p * 1.1).astype("f4") for n, p in run.passes.items()}
+    references = {"R1": Halves(run.passes, noisy), "Rinf": Halves(noisy, run.passes)}
+    first = study.score_run(run, references)
+    assert set(first["Diffuse Indirect"]) == {"R1", "Rinf"} and set(first["Diffuse Direct"]) == {"Rinf"}
+    monkeypatch.setattr(study, "score", lambda *a, **k: pytest.fail("scored again"))
+    assert json.dumps(study.score_run(run, references)) == json.dumps(first)
+    with pytest.raises(pytest.fail.Exception, match="scored again"):
+        study.score_run(run, {"R1": Halves(noisy, noisy)})
+
+
+def test_a_slow_candidate_has_fewer_frames(gl, tmp_path):
+    """One at least, and their number is in the record."""
+    scene, size = scenes.cornell(), (16, 9)
+    runs = study.measure(
+        scene,
+        "key",
+        size,
+        [Candidate("RSM", (("samples", 1),))],
+        base=Settings(),
+        driver="test",
+        cache=tmp_path,
+        repeats=50,
+        budget_s=0.0,
+    )
+    record = study.scene_record("cornell", "key", size, 8, runs, {}, 30)["candidates"][0]
+    assert record["frames"] == 2 and record["worst_ms"] >= record["moving_ms"] > 0 and record["p95"] >= record["ms"]
+
+
+def test_the_blender_that_eevee_runs_in_is_named_or_found(blender, tmp_path, monkeypatch):
+    """The option wins over the environment, that over the path; what is named must be there."""
+    from gi_addon.host import eevee
+
+    for folder in ("named", "set", "path"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "blender").write_text("#!/bin/sh\necho Blender 5.2.0 from a test\n")
+        (tmp_path / folder / "blender").chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path / "path"))
+    monkeypatch.delenv("QUARTET_BLENDER", raising=False)
+    assert eevee.program() == str(tmp_path / "path" / "blender")
+    monkeypatch.setenv("QUARTET_BLENDER", str(tmp_path / "set" / "blender"))
+    assert eevee.program() == str(tmp_path / "set" / "blender")
+    assert eevee.program(tmp_path / "named" / "blender") == str(tmp_path / "named" / "blender")
+    with pytest.raises(RuntimeError, match="no such program"):
+        eevee.program(tmp_path / "nowhere")
+    with eevee.Eevee(blender.context.scene, eevee.program()) as other:
+        assert other.version == "Blender 5.2.0 from a test"
 
 
 def test_a_candidate_that_fails_is_left_out_and_said(gl, tmp_path):

@@ -144,3 +144,33 @@ def test_strict_fails_on_a_failure(gl, tmp_path, monkeypatch):
     assert CliRunner().invoke(main, options).exit_code == 0
     result = CliRunner().invoke(main, [*options, "--strict"])
     assert result.exit_code == 1 and "RSM 1" in result.output
+
+
+def test_an_interrupted_suite_goes_on_where_it_stopped(gl, tmp_path, monkeypatch):
+    """What ended is read back with its pictures and plots, an exception is tried again, another source is another result."""
+    ran = []
+    true = stability.run_one
+
+    def counting(suite, key):
+        ran.append(key)
+        if len(ran) == 2:
+            raise KeyboardInterrupt
+        return true(suite, key)
+
+    monkeypatch.setattr(stability, "run_one", counting)
+    keys = ["15", "16"]
+    with pytest.raises(KeyboardInterrupt):
+        stability.run(["SSDO"], keys, cache=tmp_path)
+    found = stability.run(["SSDO"], keys, cache=tmp_path)["SSDO"]
+    assert ran == ["15", "16", "16"]
+    again = stability.run(["SSDO"], keys, cache=tmp_path)["SSDO"]
+    assert len(ran) == 3
+    assert again["15"].quantities == found["15"].quantities and again["15"].curves == found["15"].curves
+    assert np.array_equal(again["16"].pictures["first"], found["16"].pictures["first"].astype("f4"))
+    monkeypatch.setattr(stability, "source_version", lambda: "another")
+    stability.run(["SSDO"], ["15"], cache=tmp_path)
+    assert ran[3:] == ["15"]
+    for path in tmp_path.glob("*.npz"):
+        path.write_bytes(b"damaged")
+    stability.run(["SSDO"], ["16"], cache=tmp_path)
+    assert ran[4:] == ["16"]

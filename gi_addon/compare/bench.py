@@ -10,6 +10,8 @@ all of them; medians and ratios of one run are what to look at.
 from __future__ import annotations
 
 import csv
+import hashlib
+import json
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, field, replace
@@ -25,6 +27,7 @@ from ..scene import Scene, World
 from ..settings import SettingError, Settings
 from .page import dump
 from .paper import GTX_1070, TABLE_2, Row
+from .source import source_version
 
 _TOLERANCE = 0.03  # the protocol's upper bound for the calibration kernel's variation
 
@@ -93,7 +96,7 @@ def calibrate(gl: GL, *, invocations: int = 1 << 16, most: int = 40) -> Calibrat
 @dataclass
 class Timing:
     """One row, measured: milliseconds of every moving and still frame, per pass (median), bytes; ``problem`` instead of
-    numbers where it could not run."""
+    numbers where it could not run; ``first`` the ms of its first frame, which builds and compiles."""
 
     row: Row
     size: tuple[int, int]
@@ -102,6 +105,8 @@ class Timing:
     passes: dict[str, float] = field(default_factory=dict)
     planned_mib: float = 0.0
     held_mib: float = 0.0
+    first: float = 0.0
+    visits: int = 0
     problem: str = ""
 
     def summary(self) -> dict[str, float | None]:
@@ -118,7 +123,24 @@ class Timing:
             "still_ms": float(np.median(self.still)),
             "fps": 1e3 / median,
             "still_fps": 1e3 / float(np.median(self.still)),
+            "frames": len(self.moving),
+            "still_frames": len(self.still),
         }
+
+    def save(self, path: Path) -> None:
+        """Keep what was measured, whole or not at all."""
+        path.parent.mkdir(parents=True, exist_ok=True)
+        part = path.with_suffix(".part")
+        part.write_text(dump({k: v for k, v in vars(self).items() if k not in ("row", "size")}))
+        part.replace(path)
+
+    @staticmethod
+    def load(path: Path, row: Row, size: tuple[int, int]) -> Timing:
+        """What was kept, or nothing measured yet where there is none or it is damaged."""
+        try:
+            return Timing(row, size, **json.loads(path.read_text()))
+        except (OSError, ValueError, TypeError):
+            return Timing(row, size)
 
 
 def bench_settings(row: Row) -> Settings:
@@ -156,21 +178,33 @@ def bench(
     frames: int | None = None,
     rows: Iterable[Row] | None = None,
     limit_s: float = float("inf"),
+    budget_s: float = float("inf"),
+    cache: Path | None = None,
     progress: Callable[[str], None] = lambda text: None,
 ) -> tuple[Calibration, list[Timing]]:
     """Time every row of the paper's table for ``techniques`` at ``scale`` times its picture size.
 
     ``frames`` of each kind per row (default 50 on a GPU, 5 on a software driver), half of them on the way there and half
-    on the way back. A row whose first frame takes longer than ``limit_s`` is left out, with that as its problem.
+    on the way back; fewer, one at least, where they don't fit into ``budget_s`` seconds a row and way. A row whose first
+    frame takes longer than ``limit_s`` is left out, with that as its problem. With ``cache`` each visit is kept there as it
+    ends, by scene, settings, size, driver and version, and an interrupted bench goes on.
     """
     techniques = list(techniques)
     chosen = [r for r in (rows or TABLE_2) if r.technique in techniques]
     plain = bench_scene(scene)
+    key, version = (plain.digest(), source_version()) if cache else ("", "")
 
     def job(gl: GL) -> tuple[Calibration, list[Timing]]:
         count = frames or (5 if gl.software else 50)
         calibration = calibrate(gl)
-        timings = [Timing(r, (max(1, round(r.resolution[0] * scale)), max(1, round(r.resolution[1] * scale)))) for r in chosen]
+        kept: dict[str, Path] = {}
+        timings = []
+        for r in chosen:
+            size = (max(1, round(r.resolution[0] * scale)), max(1, round(r.resolution[1] * scale)))
+            named = (key, r.key, r.settings, size, count, budget_s, driver(), version)
+            if cache:
+                kept[r.key] = cache / f"{hashlib.blake2b(repr(named).encode(), digest_size=16).hexdigest()}.json"
+            timings.append(Timing.load(kept[r.key], r, size) if cache else Timing(r, size))
         renderer = Renderer(gl)
         steps = iter(range(1, 1 << 30))
 
@@ -183,37 +217,52 @@ def bench(
             gl.ctx.finish()
             return (time.perf_counter() - start) * 1e3
 
+        def frames_of(n: int, settings: Settings, size: tuple[int, int], moving: bool) -> list[float]:
+            """A frame to settle, then up to ``n``, as many as fit into half the budget."""
+            end = time.perf_counter() + budget_s / 2.0
+            last = frame(settings, size, moving, next(steps) if moving else 0)
+            out: list[float] = []
+            while len(out) < n and (not out or time.perf_counter() + last * 1e-3 < end):
+                last = frame(settings, size, moving, next(steps) if moving else 0)
+                out.append(last)
+            return out
+
         def visit(timing: Timing, n: int, measure_passes: bool) -> None:
             settings = bench_settings(timing.row)
             renderer.timers.enabled = False
-            first = frame(settings, timing.size, True, next(steps))
-            if first > limit_s * 1e3:
-                timing.problem = f"its first frame took {first / 1e3:.0f} s, over the limit of {limit_s:g} s"
+            timing.first = max(timing.first, frame(settings, timing.size, True, next(steps)))
+            if over(timing):
                 return
-            frame(settings, timing.size, True, next(steps))
-            timing.moving += [frame(settings, timing.size, True, next(steps)) for _ in range(n)]
-            frame(settings, timing.size, False, 0)
-            timing.still += [frame(settings, timing.size, False, 0) for _ in range(n)]
+            timing.moving += frames_of(n, settings, timing.size, True)
+            timing.still += frames_of(n, settings, timing.size, False)
             if measure_passes:
                 renderer.timers.enabled = True
                 renderer.timers.reset()
-                for _ in range(max(2, n)):
-                    frame(settings, timing.size, True, next(steps))
+                frames_of(n, settings, timing.size, True)
                 timing.passes = {k: float(np.median(v)) for k, v in renderer.timers.collect().items()}
                 timing.planned_mib = renderer._plan.nbytes() / MIB
                 timing.held_mib = gl.bytes() / MIB
 
+        def over(timing: Timing) -> bool:
+            if timing.first > limit_s * 1e3 and not timing.moving:
+                timing.problem = f"its first frame took {timing.first / 1e3:.0f} s, over the limit of {limit_s:g} s"
+            return bool(timing.problem)
+
         try:
-            there = [(t, -(-count // 2), True) for t in timings]
-            back = [(t, count // 2, False) for t in reversed(timings)]
-            for timing, n, measure_passes in there + back:
-                if timing.problem or not n:
+            there = [(t, -(-count // 2), 1) for t in timings]
+            back = [(t, count // 2, 2) for t in reversed(timings)]
+            for timing, n, number in there + back:
+                if timing.visits >= number or not n or over(timing):
                     continue
-                progress(f"{timing.row.key} ({'there' if measure_passes else 'back'})")
+                progress(f"{timing.row.key} ({'there' if number == 1 else 'back'})")
                 try:
-                    visit(timing, n, measure_passes)
+                    visit(timing, n, number == 1)
+                    timing.visits = number if not timing.problem else 0
                 except (GLError, SettingError) as error:
                     timing.problem = str(error)
+                if cache:
+                    # A limit may be another next time, and a failure may be mended: neither is kept, the first frame is.
+                    replace(timing, problem="").save(kept[timing.row.key])
         finally:
             renderer.timers.enabled = False
             renderer.close()
@@ -277,7 +326,8 @@ def write(folder: Path, scene_name: str, scale: float, calibration: Calibration,
         f"<p>{esc(hardware_text(calibration))}</p>",
         "<p class=quiet>Moving: the sun turns a hair every frame, so everything that depends on light is made anew (the paper's "
         "case). Still: what can be kept is kept. ms are medians of interleaved frames (A B … B A), ± the median absolute "
-        "deviation. A ratio at another picture size than the paper's is no statement about speed; ratios between rows are.</p>",
+        "deviation, of as many frames as the table says. A ratio at another picture size than the paper's is "
+        "no statement about speed; ratios between rows are.</p>",
         table(
             [
                 "technique",
@@ -289,6 +339,7 @@ def write(folder: Path, scene_name: str, scale: float, calibration: Calibration,
                 "ms moving",
                 "± MAD",
                 "P95",
+                "frames",
                 "ms still",
                 "× paper",
                 "× paper per hardware",
@@ -311,6 +362,7 @@ def write(folder: Path, scene_name: str, scale: float, calibration: Calibration,
                                 "ms",
                                 "mad",
                                 "p95",
+                                "frames",
                                 "still_ms",
                                 "ratio",
                                 "ratio_per_hardware",
@@ -319,7 +371,7 @@ def write(folder: Path, scene_name: str, scale: float, calibration: Calibration,
                             )
                         ]
                         if r.get("ms")
-                        else [r["problem"] or "–", *[""] * 8]
+                        else [r["problem"] or "–", *[""] * 9]
                     ),
                     ", ".join(f"{k} {v:.2f}" for k, v in sorted(r["passes"].items(), key=lambda i: -i[1])[:4]),
                 ]

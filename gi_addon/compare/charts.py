@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from .page import COLORS, esc, number
+from .page import COLORS, INK, esc, number
 
 _SYMBOLS = {
     "RSM": "circle",
@@ -49,11 +49,11 @@ def hypervolume(points: Sequence[tuple[float, float]], corner: tuple[float, floa
 
 
 def points_of(record: dict, component: str, reference: str, metric: str) -> list[dict]:
-    """The candidates of a scene record that have a figure for this component, with ``x`` (ms) and ``y``. Peers bounce on:
-    one bounce is no reference for them."""
+    """The candidates of a scene record that have a figure for this component, with ``x`` (ms) and ``y``. Peers bounce on,
+    and so do candidates with more bounces: one bounce is no reference for them."""
     out = []
     for c in record["candidates"]:
-        if reference == "R1" and not c["technique"]:
+        if reference == "R1" and (not c["technique"] or c["options"].get("bounces", 1) > 1):
             continue
         s = c["scores"].get(component, {}).get(reference)
         if s is not None and s.get(metric) is not None and math.isfinite(s[metric]):
@@ -112,10 +112,10 @@ def pareto_figure(record: dict, component: str, reference: str, metric: str = "r
                     "color": COLORS.get(method),
                     "symbol": _SYMBOLS.get(method, "circle"),
                     "size": 10,
-                    "line": {"width": 1, "color": "#222"},
+                    "line": {"width": 1, "color": INK},
                 },
                 hovertext=[
-                    f"<b>{esc(p['method'])}</b><br>{esc(p['label'])}<br>{p['x']:.4g} ms ± {p['mad']:.2g}"
+                    f"<b>{esc(p['method'])}</b><br>{esc(p['label'])}<br>{p['x']:.4g} ms ± {p['mad']:.2g}, {p['frames']} frames"
                     f"<br>relMSE {number(p['score']['rel_mse'])} [{number(p['score']['low'])} … {number(p['score']['high'])}]"
                     f"<br>gain {number(p['score']['gain'])}, FLIP {number(p['score']['flip'])}"
                     + (f"<br>{p['mib']:.1f} MiB" if p.get("mib") else "")
@@ -132,10 +132,13 @@ def pareto_figure(record: dict, component: str, reference: str, metric: str = "r
                 y=[points[i]["y"] for i in front],
                 mode="lines",
                 name="Pareto front",
-                line={"color": "#222", "width": 1.5, "shape": "hv"},
+                line={"color": INK, "width": 1.5, "shape": "hv"},
                 hoverinfo="skip",
             )
         )
+    for rank, i in enumerate(front if metric == "rel_mse" else (), 1):
+        place = {"x": math.log10(points[i]["x"]), "y": math.log10(points[i]["y"])}
+        figure.add_annotation(**place, text=str(rank), showarrow=False, xshift=-12, yshift=-12, font={"size": 11})
     if points and metric == "rel_mse":
         null = points[0]["score"]
         ends = [min(p["x"] for p in points) / 1.3, max(p["x"] for p in points) * 1.3]

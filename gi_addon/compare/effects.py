@@ -156,15 +156,15 @@ def command(techniques: list[str], size: tuple[int, int], samples: int, output: 
     from rich.console import Console
     from rich.table import Table
 
-    from ..cli import _blender, _sync
+    from ..cli import _blender
 
     cells: list[Cell] = []
     with Studio() as studio:
         for effect, how in JUDGED.items():
             with _blender(Path(f"builtin:effect-{effect}"), None, None, size, None, ()) as bscene:
-                from ..host import cycles
+                from ..host import cycles, embedded
 
-                plain, size = _sync(bscene)
+                plain, size = embedded.plain(bscene)
 
                 def run_cycles(bounces: int, count: int, seed: int, bscene=bscene, how=how):
                     cycles.set_up(bscene, cycles.Reference(bounces, count, seed))

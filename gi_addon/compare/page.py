@@ -16,6 +16,8 @@ import numpy as np
 
 from .sheet import srgb
 
+# What is drawn in the text's colour, dark or light: the page puts that in its place.
+INK = "#222"
 # Okabe and Ito's colours, told apart with any colour vision.
 COLORS = {
     "RSM": "#0072B2",
@@ -24,8 +26,8 @@ COLORS = {
     "SSDO": "#CC79A7",
     "HYBRID": "#E69F00",
     "AUTO": "#56B4E9",
-    "Cycles": "#555555",
-    "Cycles + OIDN": "#999999",
+    "Cycles": "#777777",
+    "Cycles + OIDN": "#aaaaaa",
     "EEVEE": "#F0E442",
 }
 
@@ -145,16 +147,12 @@ def plotly_source() -> str:
 def chart(figure: Any, name: str) -> str:
     """A plotly figure as a div and the script that draws it; the page must hold plotly.js."""
     body = figure.to_json().replace("</", "<\\/")
-    return (
-        f'<div class=chart id="{name}" style="width:100%"></div><script>(function(){{const f={body};'
-        f'Plotly.newPlot("{name}",f.data,f.layout,{{responsive:true,displaylogo:false}})'
-        ".then(()=>{document.body.dataset.charts=(+(document.body.dataset.charts||0)+1)})})()</script>"
-    )
+    return f'<div class=chart id="{name}" style="width:100%"></div><script>drawChart("{name}",{body})</script>'
 
 
 def document(title: str, body: str, *, charts: bool, scripts: str = "") -> str:
     """A whole page."""
-    source = f"<script>{plotly_source()}</script>" if charts else ""
+    source = f"<script>{plotly_source()}</script><script>{(_HERE / 'charts.js').read_text()}</script>" if charts else ""
     css = (_HERE / "page.css").read_text()
     return (
         f'<!doctype html><html lang=en><head><meta charset=utf-8><meta name=viewport content="width=device-width">'

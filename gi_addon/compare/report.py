@@ -56,7 +56,7 @@ def _wall(index: int, scene: Measured) -> tuple[str, dict]:
             if test is None:
                 continue
             errors = error_map(test, reference.a[name], reference.b[name]).mean(axis=-1)
-            label = f"{run.candidate.method}: {run.candidate.label} ({run.ms:.3g} ms)"
+            label = f"{run.candidate.method}: {run.candidate.label} ({number(run.ms)} ms)"
             shown[label] = {"image": data_uri(test, scale=scale), "heat": bytes_uri(heat(errors[::-1], *_HEAT))}
     width, height = scene.record["size"]
     bar = bytes_uri(np.repeat(heat(np.geomspace(*_HEAT, 256)[None], *_HEAT), 8, axis=0))
@@ -92,7 +92,9 @@ def verdict_lines(record: dict) -> list[str]:
         s = charts.summary(record, component, reference)
         if not s["front"]:
             continue
-        front = "; ".join(f"{p['method']} ({p['label']}) {p['x']:.3g} ms, relMSE {number(p['y'])}" for p in s["front"])
+        front = "; ".join(
+            f"{i} {p['method']} ({p['label']}) {number(p['x'])} ms, relMSE {number(p['y'])}" for i, p in enumerate(s["front"], 1)
+        )
         lines.append(f"{component} against {_SIGN[reference]}: on the Pareto front are {front}.")
         points = charts.points_of(record, component, reference, "rel_mse")
         worse = sorted({p["method"] for p in points} - {p["method"] for p in points if p["y"] < s["constant"]})
@@ -116,7 +118,7 @@ def yardstick(record: dict) -> list[list]:
     unit = next((p for p in points if p["method"] == "Cycles + OIDN" and p["options"].get("samples") == 1), None)
     if unit is None:
         return []
-    rows: list[list] = [["Cycles 1 spp + OIDN", f"{unit['x']:.3g} ms", number(unit["y"]), "", ""]]
+    rows: list[list] = [["Cycles 1 spp + OIDN", f"{number(unit['x'])} ms", number(unit["y"]), "", ""]]
     for method in dict.fromkeys(p["method"] for p in points):
         own = [p for p in points if p["method"] == method]
         cells = []
@@ -150,13 +152,15 @@ def _scene_html(index: int, scene: Measured, drawn: dict[str, object]) -> tuple[
     wall, pictures = _wall(index, scene)
     samples = record["reference_samples"]
     made = f"with {samples} samples each" if samples else "rendered elsewhere"
+    made += "".join(f"; {method}: {version}" for method, version in record.get("peers", {}).items())
     parts = [
         f'<h2 id="s{index}">{esc(record["scene"])}</h2>',
         f"<p class=quiet>{record['size'][0]} × {record['size'][1]} pixels, {record['triangles']} triangles; Cycles references of "
         f"two halves {made}.</p>",
         "<ul>" + "".join(f"<li>{esc(line)}</li>" for line in verdict_lines(record)) + "</ul>",
         wall,
-        "<h3>Speed against accuracy</h3>",
+        "<h3>Speed against accuracy</h3><p class=quiet>Bars are 95 % intervals, the step line is the Pareto front, its numbers "
+        "those of the list above. Candidates with several bounces are left out where one bounce is the reference.</p>",
     ]
     for component, reference in COMPONENTS:
         tag = f"{stem}-{component.lower().replace(' ', '-')}-{reference}"
@@ -250,7 +254,8 @@ def write(
     top = (
         f"<h1>Quartet GI: speed against accuracy</h1><p class=lead>Quartet {esc(head['version'])} on {esc(head['driver'])}, "
         f"{esc(head['date'])}. Errors are against unbiased Cycles; R1 has one diffuse and one glossy bounce, R∞ has 32. Peers "
-        f"bounce as often as by default and are compared with R∞ only. Nothing is scaled to fit: the gain column says so.</p>"
+        f"bounce as often as by default and are compared with R∞ only; so is light that no bounce changes. Nothing is scaled to "
+        f"fit: the gain column says so.</p><p class=quiet>{esc(head.get('calibration', ''))}</p>"
         f"<nav>{links}</nav>"
     )
     data = dump(walls).replace("</", "<\\/")

@@ -7,10 +7,13 @@ technique that by nature cannot pass keeps its measured value and is shown with 
 
 from __future__ import annotations
 
+import hashlib
+import json
 import time
 import traceback
+import zipfile
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +26,7 @@ from ..renderer import Result
 from ..scene import Scene
 from ..settings import walk
 from .page import dump
+from .source import checks_version, source_version
 from .studio import Studio, has_setting, settings_for
 
 PASS, FAIL, NATURE, NOT_APPLICABLE, REPORTED, ERROR = "pass", "fail", "fail by nature", "n/a", "reported", "error"
@@ -115,7 +119,8 @@ def reported(name: str, value: float) -> Quantity:
 
 @dataclass
 class Curve:
-    """A plot of a finding: ``lines`` by name over ``x``."""
+    """A plot of a finding: ``lines`` by name over ``x``; ``limits`` are levels that a line must not pass, ``marks`` places
+    on the x axis."""
 
     title: str
     x_title: str
@@ -124,6 +129,8 @@ class Curve:
     lines: dict[str, list[float]]
     log_x: bool = False
     log_y: bool = False
+    limits: dict[str, float] = field(default_factory=dict)
+    marks: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass
@@ -150,6 +157,29 @@ class Finding:
             else:
                 self.verdict = NATURE if self.nature else FAIL
         return self
+
+
+def save_finding(path: Path, finding: Finding) -> None:
+    """Keep a finding with its pictures, whole or not at all."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    text = json.dumps({k: v for k, v in asdict(replace(finding, pictures={})).items() if k != "pictures"})
+    part = path.with_suffix(".part.npz")
+    pictures = {f"picture:{name}": np.asarray(image, "f4") for name, image in finding.pictures.items()}
+    np.savez_compressed(part, finding=np.frombuffer(text.encode(), np.uint8), **pictures)
+    part.replace(path)
+
+
+def load_finding(path: Path) -> Finding | None:
+    """Read a finding; None where there is none or it is damaged."""
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            values = json.loads(bytes(data["finding"]).decode())
+            values["quantities"] = [Quantity(**q) for q in values["quantities"]]
+            values["curves"] = [Curve(**c) for c in values["curves"]]
+            pictures = {k.removeprefix("picture:"): data[k] for k in data.files if k.startswith("picture:")}
+            return Finding(**values, pictures=pictures)
+    except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile, EOFError):
+        return None
 
 
 def not_applicable(reason: str) -> Finding:
@@ -242,9 +272,11 @@ def run(
     keys: Sequence[str] | None = None,
     *,
     full: bool = False,
+    cache: Path | None = None,
     progress: Callable[[str, Test, Finding], None] | None = None,
 ) -> dict[str, dict[str, Finding]]:
-    """Technique -> test -> finding."""
+    """Technique -> test -> finding. With ``cache`` each is kept there as it ends, by driver and version, and an interrupted
+    run goes on; what ended in an exception is tried again."""
     from . import stability_checks  # noqa: F401 — fills the registry
 
     out: dict[str, dict[str, Finding]] = {}
@@ -253,7 +285,14 @@ def run(
         try:
             out[technique] = {}
             for key in keys or TESTS:
-                finding = out[technique][key] = run_one(suite, key)
+                named = (technique, key, full, suite.size, driver(), source_version(), checks_version())
+                path = cache and cache / f"{hashlib.blake2b(repr(named).encode(), digest_size=16).hexdigest()}.npz"
+                finding = load_finding(path) if path else None
+                if finding is None:
+                    finding = run_one(suite, key)
+                    if path and finding.verdict != ERROR:
+                        save_finding(path, finding)
+                out[technique][key] = finding
                 if progress:
                     progress(technique, TESTS[key], finding)
         finally:

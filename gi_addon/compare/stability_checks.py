@@ -231,10 +231,9 @@ def symmetry(suite: Suite) -> Finding:
         for signs in np.array(np.meshgrid([1, -1], [1, -1], [1, -1])).T.reshape(-1, 3):
             m = np.zeros((3, 3))
             m[np.arange(3), axes] = signs
-            if np.linalg.det(m) > 0:  # reflections would turn triangles inside out; 24 rotations hold all lobes
-                turns.append(m)
+            turns.append(m)
     means = []
-    for m in turns if suite.full else turns[::6]:
+    for m in turns if suite.full else turns[::9]:
         b = scenes.SceneBuilder()
         quad = np.array([[-1.0, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1]])
         b.quads(np.stack([quad, quad[::-1] * [1, 1, -1]]), scenes.diffuse((0.8,) * 3))
@@ -247,7 +246,10 @@ def symmetry(suite: Suite) -> Finding:
         scenes.transformed(scene, turn)
         means.append(float(_gray(suite.indirect(scene, samples=1, use_ao=False)).mean()))
     spread = (max(means) - min(means)) / max(max(means), 1e-12)
-    return Finding([at_most(f"(max − min)/max over {len(means)} rotations", spread, 1e-3)])
+    return Finding(
+        [at_most(f"(max − min)/max over {len(means)} flips and permutations", spread, 1e-3)],
+        [Curve("Irradiance turned", "flip or permutation", "mean E/π", [float(i) for i in range(len(means))], {"E": means})],
+    )
 
 
 # --- 5: leaks -------------------------------------------------------------------------------------------------------
@@ -282,12 +284,16 @@ def thin_wall(suite: Suite) -> Finding:
     out.quantities += [reported(f"leak at w = {w:g}", v) for w, v in zip(widths, overall, strict=True) if w < 2.0]
     out.curves = [
         Curve(
-            "Leak through a wall",
+            "Leak through a wall, and w*",
             "wall thickness, cells",
             "E dark / E lit",
             list(widths),
-            {f"{a:g}°": worst[a] for a in angles},
+            # A logarithm has no room for no leak at all.
+            {f"{a:g}°": [max(v, 1e-5) for v in worst[a]] for a in angles},
             log_x=True,
+            log_y=True,
+            limits={"1 %": 0.01},
+            marks={f"w* = {good[0]:g}": good[0]} if good else {},
         )
     ]
     if not suite.traits.blockers:
@@ -501,6 +507,8 @@ def scale(suite: Suite) -> Finding:
         other = box(s)
         bad += int((~np.isfinite(other)).sum())
         out.quantities.append(at_most(f"relMSE at {s:g}", rel_mse(other, one), 1e-4))
+        out.pictures[f"lengths × {s:g}"] = 0.5 * other
+    out.pictures["lengths × 1"] = 0.5 * one
     out.quantities.append(at_most("values that are not finite", bad, 0))
     return out
 
@@ -513,6 +521,7 @@ def resolution(suite: Suite) -> Finding:
     pairs = [_corner(suite, size=s, samples=16) for s in screens]
     gains = [float(np.nansum(i) / np.nansum(e)) for i, e in pairs]
     out.quantities.append(at_most("drift of g, screen ½–2×", (max(gains) - min(gains)) / max(np.mean(gains), 1e-12), 0.03))
+    out.curves = [Curve("Gain by width of the picture", "pixels", "g", [float(w) for w, _ in screens], {"g": gains}, log_x=True)]
     path = suite.traits.grid or suite.traits.map
     if not path or not has_setting(path):
         out.note = "it has no grid or map of its own"
@@ -527,7 +536,7 @@ def resolution(suite: Suite) -> Finding:
     )
     growth = max(b / max(a, 1e-12) for a, b in itertools.pairwise(errors))
     out.quantities.append(at_most("largest growth of relMSE from one size to the next", growth, 1.05))
-    out.curves = [
+    out.curves += [
         Curve(f"Error by {path}", path, "relMSE", [float(n) for n in sizes], {"relMSE": errors}, log_x=True, log_y=True),
         Curve(f"Gain by {path}", path, "g", [float(n) for n in sizes], {"g": gains}, log_x=True),
     ]
@@ -584,7 +593,11 @@ def determinism(suite: Suite) -> Finding:
     for _ in range(2):
         with Studio(suite.studio.thread) as studio:
             runs.append(studio.render(scenes.cornell(light="area"), settings, outputs, suite.size).passes)
-    return Finding([at_most(f"{n}: max |a − b|", np.abs(runs[0][n].astype("f8") - runs[1][n]).max(), 0.0) for n in outputs])
+    differences = {n: np.abs(runs[0][n].astype("f8") - runs[1][n]) for n in outputs}
+    out = Finding([at_most(f"{n}: max |a − b|", d.max(), 0.0) for n, d in differences.items()])
+    out.pictures = {"first": 0.5 * runs[0]["Combined"][..., :3], "second": 0.5 * runs[1]["Combined"][..., :3]}
+    out.pictures["difference × 1000"] = 1e3 * differences["Combined"][..., :3]
+    return out
 
 
 @test("17", "Linearity", "power × k; two lights against the sum of each: relative difference", fast=False)
@@ -611,6 +624,8 @@ def linearity(suite: Suite) -> Finding:
     out.quantities.append(
         at_most("two lights, indirect, mean", abs(both["Diffuse Indirect"].mean() / max(indirect, 1e-12) - 1.0), 1e-3)
     )
+    for title, passes in (("one light", first), ("the other", second), ("both", both)):
+        out.pictures[f"{title}, indirect"] = passes["Diffuse Indirect"][..., :3] / max(both["Diffuse Indirect"].max(), 1e-12)
     if suite.traits.set == "rsm.samples":
         out.nature = "both lights share one set of virtual lights: each alone draws another, equal up to its noise"
     return out
@@ -653,6 +668,7 @@ def non_finite(suite: Suite) -> Finding:
         found = {n: int((~np.isfinite(t)).sum()) for n, t in suite.studio.textures().items()}
         wrong = {n: c for n, c in found.items() if c}
         out.quantities.append(at_most(f"{name}: passes", bad, 0))
+        out.pictures[name] = np.nan_to_num(passes["Combined"][..., :3])
         out.quantities.append(at_most(f"{name}: {len(found)} textures", sum(wrong.values()), 0))
         if wrong:
             out.note += f"{name}: {', '.join(f'{n} {c}' for n, c in wrong.items())}. "

@@ -13,6 +13,10 @@ def _figure(curve: Curve):
     import plotly.graph_objects as go
 
     figure = go.Figure([go.Scatter(x=curve.x, y=y, name=name, mode="lines+markers") for name, y in curve.lines.items()])
+    for name, level in curve.limits.items():
+        figure.add_hline(y=level, line={"color": "#b3261e", "dash": "dash", "width": 1}, annotation={"text": name})
+    for name, place in curve.marks.items():
+        figure.add_vline(x=place, line={"color": "#888", "dash": "dot", "width": 1}, annotation={"text": name})
     figure.update_layout(
         template="simple_white",
         height=280,

@@ -10,15 +10,14 @@ from __future__ import annotations
 import csv
 import hashlib
 import json
+import time
 import zipfile
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache
 from pathlib import Path
 
 import numpy as np
 
-from .. import __version__
 from ..gl.context import MIB
 from ..scene import Scene
 from ..settings import Settings
@@ -26,6 +25,7 @@ from .bench import nudged
 from .metrics import error_map, score
 from .page import dump, finite
 from .references import Halves
+from .source import scoring_version, source_version
 from .studio import Studio
 from .sweeps import Candidate
 
@@ -40,36 +40,32 @@ COMPARED = (
     "Environment",
     "Ambient Occlusion",
 )
+# Light that no bounce changes: one reference is enough, and it is the one that peers share.
+_UNBOUNCED = ("Diffuse Direct", "Glossy Direct", "Emission", "Environment", "Ambient Occlusion")
 _TILE = 8
-
-
-@cache
-def source_version() -> str:
-    """The version with a fingerprint of everything that makes pictures."""
-    root = Path(__file__).resolve().parent.parent
-    h = hashlib.blake2b(digest_size=6)
-    for path in sorted([*root.rglob("*.py"), *root.rglob("*.glsl")]):
-        if "compare" not in path.relative_to(root).parts and not path.name.startswith("cli"):
-            h.update(path.relative_to(root).as_posix().encode() + path.read_bytes())
-    return f"{__version__}+{h.hexdigest()}"
 
 
 @dataclass
 class Run:
-    """A candidate on one scene: its pictures, and milliseconds of whole frames in both visits. ``moving`` is a frame in
-    which the lights changed; ``per_pass`` ms of one whole picture by pass; ``mib`` of the plan."""
+    """A candidate on one scene: its pictures, and milliseconds of whole frames in all visits. ``moving`` are frames in
+    which the lights changed; ``per_pass`` ms of one whole picture by pass; ``mib`` of the plan; ``path`` where it is kept."""
 
     candidate: Candidate
     passes: dict[str, np.ndarray]
     times: list[float] = field(default_factory=list)
-    moving: float | None = None
+    moving: list[float] = field(default_factory=list)
     per_pass: dict[str, float] = field(default_factory=dict)
     mib: float | None = None
     visits: int = 0
+    path: Path | None = None
 
     @property
     def ms(self) -> float:
         return float(np.median(self.times))
+
+    @property
+    def p95(self) -> float:
+        return float(np.percentile(self.times, 95))
 
     @property
     def mad(self) -> float:
@@ -101,7 +97,7 @@ def load_run(path: Path, candidate: Candidate) -> Run | None:
         with np.load(path, allow_pickle=False) as data:
             meta = json.loads(bytes(data["meta"]).decode())
             passes = {k[5:]: data[k] for k in data.files if k.startswith("pass:")}
-            return Run(candidate, passes, **meta)
+            return Run(candidate, passes, **meta, path=path)
     except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile, EOFError):
         return None
 
@@ -110,19 +106,40 @@ def load_run(path: Path, candidate: Candidate) -> Run | None:
 PeerRender = Callable[[Candidate, Sequence[str]], tuple[dict[str, np.ndarray], float]]
 
 
-def visit(studio: Studio, scene: Scene, run: Run, base: Settings, size: tuple[int, int], repeats: int) -> None:
-    """Render a technique's candidate once for its pictures and ``repeats`` times for its time."""
+def visit(
+    studio: Studio, scene: Scene, run: Run, base: Settings, size: tuple[int, int], repeats: int, budget_s: float = np.inf
+) -> None:
+    """Render a technique's candidate once for its pictures and ``repeats`` times for its time, still and moving; once at
+    least, and no more than fit into ``budget_s`` seconds."""
     settings = run.candidate.settings(base)
+
+    def frame(target: Scene, outputs: Sequence[str] = ("Combined",), **options):
+        return studio.render(target, settings, outputs, size, **options)
+
+    def timed_frames(target: Callable[[int], Scene]) -> list[float]:
+        out, end = [], time.perf_counter() + budget_s / 2.0
+        while len(out) < repeats and (not out or time.perf_counter() + out[-1] * 1e-3 < end):
+            out.append(frame(target(len(out))).seconds * 1e3)
+        return out
+
     if not run.passes:
-        result = studio.render(scene, settings, COMPARED, size)
-        run.passes = {n: p[..., :3].astype(np.float32) for n, p in result.passes.items()}
-    first = studio.render(scene, settings, ("Combined",), size)
-    run.mib = first.plan.nbytes() / MIB
-    run.times += [studio.render(scene, settings, ("Combined",), size).seconds * 1e3 for _ in range(repeats)]
+        run.passes = {n: p[..., :3].astype(np.float32) for n, p in frame(scene, COMPARED).passes.items()}
+    run.mib = frame(scene).plan.nbytes() / MIB
+    run.times += timed_frames(lambda i: scene)
     if not run.per_pass:
-        timed = studio.render(scene, settings, ("Combined",), size, timed=True)
-        run.per_pass = {k: float(np.sum(v)) for k, v in timed.milliseconds.items()}
-        run.moving = studio.render(nudged(scene, 1), settings, ("Combined",), size).seconds * 1e3
+        run.per_pass = {k: float(np.sum(v)) for k, v in frame(scene, timed=True).milliseconds.items()}
+    run.moving += timed_frames(lambda i: nudged(scene, len(run.moving) + i + 1))
+
+
+def visit_peer(peer: PeerRender, run: Run, repeats: int, budget_s: float) -> None:
+    """The same of a peer."""
+    passes, _ = peer(run.candidate, COMPARED)  # the first one loads, builds and compiles
+    run.passes = run.passes or {n: np.ascontiguousarray(p[..., :3]) for n, p in passes.items()}
+    end = time.perf_counter() + budget_s
+    for i in range(repeats):
+        if i and time.perf_counter() + run.times[-1] * 1e-3 > end:
+            break
+        run.times.append(peer(run.candidate, COMPARED)[1] * 1e3)
 
 
 def measure(
@@ -135,19 +152,21 @@ def measure(
     driver: str,
     cache: Path,
     peer: PeerRender | None = None,
-    peer_version: str = "",
-    repeats: int = 2,
+    peer_versions: Mapping[str, str] | None = None,
+    repeats: int = 3,
     visits: int = 2,
+    budget_s: float = np.inf,
     progress: Callable[[str], None] = lambda text: None,
 ) -> list[Run]:
     """Every candidate, from the cache where it is whole. They are visited there and back (A B … B A), or only there
-    with ``visits`` 1; each visit is saved as it ends. A candidate that fails is left out, and said."""
+    with ``visits`` 1; each visit is saved as it ends. A candidate that fails is left out, and said. ``peer_versions`` by
+    method; a slow candidate has fewer than ``repeats`` frames of a kind a visit where they don't fit into ``budget_s``."""
     runs: dict[Candidate, tuple[Path, Run]] = {}
     for candidate in candidates:
         settings = None if candidate.peer else candidate.settings(base)
-        version = peer_version if candidate.peer else source_version()
+        version = (peer_versions or {}).get(candidate.method, "") if candidate.peer else source_version()
         path = cache / f"{run_key(scene_key, size, candidate, settings, driver, version)}.npz"
-        runs[candidate] = (path, load_run(path, candidate) or Run(candidate, {}))
+        runs[candidate] = (path, load_run(path, candidate) or Run(candidate, {}, path=path))
     with Studio() as studio:
         for number, order in ((1, list(runs)), (2, list(reversed(runs))))[:visits]:
             for candidate in order:
@@ -161,11 +180,9 @@ def measure(
                     if candidate.peer:
                         if peer is None:
                             raise RuntimeError("this scene is not open in Blender")
-                        passes, _ = peer(candidate, COMPARED)  # the first one loads, builds and compiles
-                        run.passes = run.passes or {n: np.ascontiguousarray(p[..., :3]) for n, p in passes.items()}
-                        run.times += [peer(candidate, COMPARED)[1] * 1e3 for _ in range(max(1, repeats // 2))]
+                        visit_peer(peer, run, repeats, budget_s)
                     else:
-                        visit(studio, scene, run, base, size, repeats)
+                        visit(studio, scene, run, base, size, repeats, budget_s)
                 except RuntimeError as error:
                     progress(f"  left out: {error}")
                     del runs[candidate]
@@ -191,19 +208,39 @@ def interval(test: np.ndarray, a: np.ndarray, b: np.ndarray, *, rounds: int = 40
 
 
 def score_run(run: Run, references: dict[str, Halves], passes: Iterable[str] = COMPARED) -> dict[str, dict[str, dict]]:
-    """pass -> reference -> figures, for passes that either side has light in."""
+    """pass -> reference -> figures, for passes that either side has light in; kept beside the run, so that an interrupted
+    scoring goes on too."""
+    path = run.path and run.path.with_suffix(f".{_fingerprint(references)}-{scoring_version()}.json")
+    if path and path.is_file():
+        return json.loads(path.read_text())
     out: dict[str, dict[str, dict]] = {}
     for name in passes:
         test = run.passes.get(name)
         for kind, halves in references.items():
-            if test is None or name not in halves.a or (run.candidate.peer and kind == "R1"):
+            if test is None or name not in halves.a:
+                continue
+            if kind == "R1" and (run.candidate.peer or name in _UNBOUNCED):
                 continue
             a, b = halves.a[name], halves.b[name]
             if a.max() <= 0 and test.max() <= 0:
                 continue
             low, high = interval(test, a, b)
             out.setdefault(name, {})[kind] = {**vars(score(test, a, b, flip=True)), "low": low, "high": high}
+    if path:
+        part = path.with_suffix(".part")
+        part.write_text(json.dumps(out))
+        part.replace(path)
     return out
+
+
+def _fingerprint(references: dict[str, Halves]) -> str:
+    """What the references hold, as a short name."""
+    h = hashlib.blake2b(digest_size=6)
+    for kind, halves in sorted(references.items()):
+        for half in (halves.a, halves.b):
+            for name in sorted(half):
+                h.update(f"{kind} {name}".encode() + np.ascontiguousarray(half[name]).tobytes())
+    return h.hexdigest()
 
 
 def scene_record(
@@ -230,7 +267,10 @@ def scene_record(
                 "options": dict(r.candidate.options),
                 "ms": r.ms,
                 "mad": r.mad,
-                "moving_ms": r.moving,
+                "p95": r.p95,
+                "frames": len(r.times),
+                "moving_ms": float(np.median(r.moving)) if r.moving else None,
+                "worst_ms": max(r.moving) if r.moving else None,
                 "mib": r.mib,
                 "passes_ms": r.per_pass,
                 "scores": score_run(r, references),
@@ -251,7 +291,11 @@ def write_results(folder: Path, head: dict, records: list[dict]) -> list[Path]:
             "method": c["method"],
             "settings": c["label"],
             "ms": c["ms"],
+            "mad": c["mad"],
+            "p95": c["p95"],
+            "frames": c["frames"],
             "moving_ms": c["moving_ms"],
+            "worst_ms": c["worst_ms"],
             "mib": c["mib"],
             "pass": p,
             "reference": kind,

@@ -17,7 +17,7 @@ AXES: dict[str, dict[str, tuple]] = {
     "SSDO": {"ssdo.samples": (64, 256), "ssdo.integrator": ("BITMASK", "RAYS"), "gather_scale": (4, 1), "bounces": (1, 3)},
 }
 SUBFRAMES = {"none": (), "samples": (1, 4), "quick": (1, 4, 16), "full": (1, 2, 4, 8, 16, 32, 64)}
-CYCLES_SAMPLES = {"none": (1, 16), "samples": (1, 4, 16), "quick": (1, 4, 16), "full": (1, 2, 4, 8, 16, 32, 64)}
+CYCLES_SAMPLES = {"none": (1, 16), "samples": (1, 4, 16), "quick": (1, 4, 16, 64), "full": (1, 2, 4, 8, 16, 32, 64)}
 EEVEE_SAMPLES = {"none": (16,), "samples": (1, 16), "quick": (1, 16), "full": (1, 4, 16, 64)}
 
 

@@ -21,10 +21,20 @@ from ..graph import Buffer, Optional, Pass, Planned, Texture, Uniform
 from ..passes.ao import AOBlur
 from ..passes.brdf_tables import BRDFTables
 from ..passes.direct_lighting import DirectLighting, TranslucentLighting
-from ..passes.gbuffer import GBuffer, TranslucentBack, TranslucentLayer, TranslucentTint, _screen
+from ..passes.gbuffer import GBuffer, TranslucentBack, TranslucentLayer, TranslucentTint
 from ..passes.lights import LightList, RSMGeneration, ShadowMaps
 from ..passes.occupancy import Occupancy
 from ..passes.resolve import Resolve
+from ..passes.screen import (
+    INDIRECT_DIFFUSE,
+    INDIRECT_GLOSSY,
+    LOBE,
+    REFRACTING,
+    TRANSMISSION_INDIRECT,
+    ScreenPass,
+    _screen,
+    no_gloss,
+)
 from ..passes.volumetric import MEDIUM_UNIFORMS, Volumetric, air, medium_defines, set_medium
 from ..passes.world_guide import WorldGuide
 from ..passes.world_rays import WorldRays
@@ -454,23 +464,18 @@ class Propagation(Pass):
             frame.gl.ctx.memory_barrier(moderngl.SHADER_IMAGE_ACCESS_BARRIER_BIT)
 
 
-class IndirectLighting(Pass):
+class IndirectLighting(ScreenPass):
     """The volume looked up at each pixel."""
 
     title = "LPV Lighting Computation"
     figure = "LPV Lighting Computation"
     reads = ("lpv.volume", Optional("lpv.walls"), "gbuffer.depth", "gbuffer.normal")
-    writes = (
-        Texture("indirect.diffuse", "indirect_diffuse", "radiance a white Lambert surface would reflect, W/(m²·sr)",
-                "rgba32f", _screen, when=lambda f: None if f.diffuse else "no visible material is diffuse"),
-    )  # fmt: skip
+    writes = (INDIRECT_DIFFUSE,)
     uniforms = _GRID
-    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/lpv/lighting_frag.glsl"}}
+    fragment = "engines/lpv/lighting_frag.glsl"
 
-    def run(self, frame: Frame, planned: Planned) -> None:
-        program = frame.program(planned)
+    def prepare(self, frame: Frame, planned: Planned, program) -> None:
         _set_grid(frame, program, planned.facts)
-        frame.screen(planned, program)
 
 
 def _march_steps(facts: Facts) -> int:
@@ -478,7 +483,7 @@ def _march_steps(facts: Facts) -> int:
     return int(sum(grid(facts).size))
 
 
-class AmbientOcclusion(Pass):
+class AmbientOcclusion(ScreenPass):
     """Rays through the geometry volume."""
 
     title = "LPV AO Generation"
@@ -493,7 +498,7 @@ class AmbientOcclusion(Pass):
         Uniform("ao_directions", "int", "rays per pixel"),
         Uniform("ao_distance", "float", "how far an occluder counts, m"),
     )
-    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/lpv/ao_frag.glsl"}}
+    fragment = "engines/lpv/ao_frag.glsl"
 
     def defines(self, facts: Facts) -> dict[str, int]:
         return {"MARCH_STEPS": _march_steps(facts), "MARCH_LIGHT": 0, "HAS_LPV_WALLS": 1}
@@ -501,62 +506,43 @@ class AmbientOcclusion(Pass):
     def absent(self, facts: Facts) -> str | None:
         return None if facts.settings.use_ao else "ambient occlusion is switched off"
 
-    def run(self, frame: Frame, planned: Planned) -> None:
-        program = frame.program(planned)
+    def prepare(self, frame: Frame, planned: Planned, program) -> None:
         ao = planned.facts.settings.ao
         _set_grid(frame, program, planned.facts, ao_directions=ao.samples, ao_distance=planned.facts.ao_distance)
-        frame.screen(planned, program)
 
 
-class GlossyLighting(Pass):
+class GlossyLighting(ScreenPass):
     """Rays of the glossy lobe through the volume."""
 
     title = "LPV Glossy Computation"
     figure = "LPV Lighting Computation"
-    reads = (
-        "lpv.volume", "lpv.walls", "gbuffer.depth", "gbuffer.normal", "gbuffer.specular", "gbuffer.lobe", "brdf.energy",
-        "brdf.average",
-    )  # fmt: skip
-    writes = (
-        Texture("indirect.glossy", "indirect_glossy", "radiance that the glossy lobe reflects, W/(m²·sr)", "rgba32f", _screen),
-    )
+    reads = ("lpv.volume", "lpv.walls", "gbuffer.depth", "gbuffer.normal", *LOBE)
+    writes = (INDIRECT_GLOSSY,)
     uniforms = (*_GRID, Uniform("glossy_rays", "int", "rays per pixel"))
-    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/lpv/glossy_frag.glsl"}}
+    fragment = "engines/lpv/glossy_frag.glsl"
 
     def defines(self, facts: Facts) -> dict[str, int]:
         return {"MARCH_STEPS": _march_steps(facts), "MARCH_LIGHT": 1, "HAS_LPV_WALLS": 1}
 
     def absent(self, facts: Facts) -> str | None:
-        if not facts.settings.use_glossy:
-            return "glossy reflections are switched off"
-        return None if facts.glossy else "no visible material is glossy"
+        return no_gloss(facts)
 
-    def run(self, frame: Frame, planned: Planned) -> None:
-        program = frame.program(planned)
+    def prepare(self, frame: Frame, planned: Planned, program) -> None:
         _set_grid(frame, program, planned.facts, glossy_rays=planned.facts.settings.lpv.glossy_rays)
-        frame.screen(planned, program)
 
 
-class Refraction(Pass):
+class Refraction(ScreenPass):
     """A refracted ray per pixel through the volume."""
 
     title = "LPV Translucency"
     figure = "LPV Lighting Computation"
-    reads = (
-        "lpv.volume", "lpv.walls", "gbuffer.transmission", "translucent.depth", "translucent.normal",
-        "translucent.color", "translucent.medium", "translucent.back_depth", "translucent.back_normal",
-    )  # fmt: skip
-    writes = (
-        Texture("transmission.indirect", "transmission_indirect", "radiance through refracting surfaces, tinted; alpha 1 "
-                "where the ray met a wall", "rgba32f", _screen),
-    )  # fmt: skip
+    reads = ("lpv.volume", "lpv.walls", *REFRACTING)
+    writes = (TRANSMISSION_INDIRECT,)
     uniforms = _GRID
-    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/lpv/refraction_frag.glsl"}}
+    fragment = "engines/lpv/refraction_frag.glsl"
 
     def defines(self, facts: Facts) -> dict[str, int]:
         return {"MARCH_STEPS": _march_steps(facts), "MARCH_LIGHT": 1, "HAS_LPV_WALLS": 1}
 
-    def run(self, frame: Frame, planned: Planned) -> None:
-        program = frame.program(planned)
+    def prepare(self, frame: Frame, planned: Planned, program) -> None:
         _set_grid(frame, program, planned.facts)
-        frame.screen(planned, program)

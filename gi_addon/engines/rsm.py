@@ -15,10 +15,19 @@ from ..graph import Buffer, Optional, Pass, Planned, Texture, Uniform
 from ..passes.ao import AOBlur, AOGeneration
 from ..passes.brdf_tables import BRDFTables
 from ..passes.direct_lighting import DirectLighting, TranslucentLighting
-from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint, _screen, gather_size
+from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint, gather_size
 from ..passes.lights import LightList, RSMGeneration, ShadowMaps
 from ..passes.occupancy import CELL_UNIFORMS, Occupancy, set_cells
 from ..passes.resolve import Resolve
+from ..passes.screen import (
+    INDIRECT_DIFFUSE,
+    INDIRECT_GLOSSY,
+    LOBE,
+    REFRACTING,
+    TRANSMISSION_INDIRECT,
+    ScreenPass,
+    _screen,
+)
 from ..passes.surface_points import SETS, SurfacePoints, points_per_subframe
 from ..passes.volumetric import MEDIUM_UNIFORMS, Volumetric, medium_defines, set_medium
 from ..passes.world_guide import WorldGuide
@@ -196,7 +205,7 @@ def _tested(reads: tuple, settings: Settings) -> tuple:
     return reads if settings.rsm.visibility == "NONE" else (Optional("occupancy"), *reads)
 
 
-class InterpolatedIndirect(Pass):
+class InterpolatedIndirect(ScreenPass):
     """Indirect irradiance at one pixel per block."""
 
     title = "RSM Interpolated Indirect Lighting Computation"
@@ -209,7 +218,7 @@ class InterpolatedIndirect(Pass):
                 "rgba32f", gather_size, scratch=True),
     )  # fmt: skip
     uniforms = (Uniform("vpl_count", "int", "virtual point lights in the list"), *CELL_UNIFORMS, *MEDIUM_UNIFORMS)
-    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/rsm/gather_low_frag.glsl"}}
+    fragment = "engines/rsm/gather_low_frag.glsl"
 
     def __init__(self, settings: Settings) -> None:
         self.reads = _tested(type(self).reads, settings)
@@ -220,15 +229,13 @@ class InterpolatedIndirect(Pass):
     def absent(self, facts: Facts) -> str | None:
         return None if facts.settings.gather_scale > 1 else "every pixel gathers for itself"
 
-    def run(self, frame: Frame, planned: Planned) -> None:
-        program = frame.program(planned)
+    def prepare(self, frame: Frame, planned: Planned, program) -> None:
         frame.set(program, vpl_count=vpl_count(planned.facts))
         set_cells(frame, program, planned.facts)
         set_medium(frame, program, planned.facts)
-        frame.screen(planned, program)
 
 
-class IndirectLighting(Pass):
+class IndirectLighting(ScreenPass):
     """Indirect light of every pixel: interpolated where the low resolution has its surface, gathered where not."""
 
     title = "RSM Lighting Computation"
@@ -238,12 +245,9 @@ class IndirectLighting(Pass):
         Optional("gbuffer.low_normal"), Optional("gbuffer.low_pixel"), Optional("indirect.low"),
         Optional("indirect.low_direction"), Optional("ao"),
     )  # fmt: skip
-    writes = (
-        Texture("indirect.diffuse", "indirect_diffuse", "radiance a white Lambert surface would reflect, W/(m²·sr)",
-                "rgba32f", _screen, when=lambda f: None if f.diffuse else "no visible material is diffuse"),
-    )  # fmt: skip
+    writes = (INDIRECT_DIFFUSE,)
     uniforms = (Uniform("vpl_count", "int", "virtual point lights in the list"), *CELL_UNIFORMS, *MEDIUM_UNIFORMS)
-    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/rsm/lighting_frag.glsl"}}
+    fragment = "engines/rsm/lighting_frag.glsl"
 
     def __init__(self, settings: Settings) -> None:
         self.reads = _tested(type(self).reads, settings)
@@ -251,12 +255,10 @@ class IndirectLighting(Pass):
     def defines(self, facts: Facts) -> dict[str, int]:
         return _gather_defines(facts)
 
-    def run(self, frame: Frame, planned: Planned) -> None:
-        program = frame.program(planned)
+    def prepare(self, frame: Frame, planned: Planned, program) -> None:
         frame.set(program, vpl_count=vpl_count(planned.facts))
         set_cells(frame, program, planned.facts)
         set_medium(frame, program, planned.facts)
-        frame.screen(planned, program)
 
 
 _RAY_READS = (
@@ -278,17 +280,15 @@ def _set_ray(frame: Frame, program, facts: Facts) -> None:
     frame.set(program, rsm_light_count=len(facts.rig.sources), vpl_count=vpl_count(facts))
 
 
-class GlossyReflections(Pass):
+class GlossyReflections(ScreenPass):
     """What glossy surfaces mirror of lit surfaces: a ray per pixel, cast in the RSMs."""
 
     title = "RSM Glossy Reflections"
     figure = "Ray Casting in RSM"
-    reads = (*_RAY_READS, "gbuffer.specular", "gbuffer.lobe", "brdf.energy", "brdf.average")
-    writes = (
-        Texture("indirect.glossy", "indirect_glossy", "radiance reflected by the glossy lobe, W/(m²·sr)", "rgba32f", _screen),
-    )  # fmt: skip
+    reads = (*_RAY_READS, *LOBE)
+    writes = (INDIRECT_GLOSSY,)
     uniforms = _RAY_UNIFORMS
-    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/rsm/glossy_frag.glsl"}}
+    fragment = "engines/rsm/glossy_frag.glsl"
 
     def defines(self, facts: Facts) -> dict[str, int]:
         return _gather_defines(facts, always=True)
@@ -296,38 +296,28 @@ class GlossyReflections(Pass):
     def absent(self, facts: Facts) -> str | None:
         return None if facts.settings.use_glossy else "glossy reflections are switched off"
 
-    def run(self, frame: Frame, planned: Planned) -> None:
-        program = frame.program(planned)
+    def prepare(self, frame: Frame, planned: Planned, program) -> None:
         _set_ray(frame, program, planned.facts)
-        frame.screen(planned, program)
 
 
-class Refraction(Pass):
+class Refraction(ScreenPass):
     """What is seen through refracting surfaces: a refracted ray per pixel, cast in the RSMs, which hold no such surface."""
 
     title = "RSM Translucency"
     figure = "Ray Casting in RSM"
-    reads = (
-        *_RAY_READS, "gbuffer.transmission", "translucent.depth", "translucent.normal",
-        "translucent.color", "translucent.medium", "translucent.back_depth", "translucent.back_normal",
-    )  # fmt: skip
-    writes = (
-        Texture("transmission.indirect", "transmission_indirect", "radiance through refracting surfaces, tinted; alpha 1 "
-                "where the ray found something", "rgba32f", _screen),
-    )  # fmt: skip
+    reads = (*_RAY_READS, *REFRACTING)
+    writes = (TRANSMISSION_INDIRECT,)
     uniforms = _RAY_UNIFORMS
-    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/rsm/refraction_frag.glsl"}}
+    fragment = "engines/rsm/refraction_frag.glsl"
 
     def defines(self, facts: Facts) -> dict[str, int]:
         return _gather_defines(facts, always=True)
 
-    def run(self, frame: Frame, planned: Planned) -> None:
-        program = frame.program(planned)
+    def prepare(self, frame: Frame, planned: Planned, program) -> None:
         _set_ray(frame, program, planned.facts)
-        frame.screen(planned, program)
 
 
-class Subsurface(Pass):
+class Subsurface(ScreenPass):
     """Light scattered below surfaces, from where it entered: the RSM's depth as a translucent shadow map."""
 
     title = "RSM Subsurface Scattering"
@@ -340,7 +330,7 @@ class Subsurface(Pass):
                 "point; share of the diffuse albedo it is for", "rgba32f", _screen),
     )  # fmt: skip
     uniforms = (*MEDIUM_UNIFORMS, Uniform("rsm_light_count", "int", "lights with reflective shadow maps"))
-    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/rsm/subsurface_frag.glsl"}}
+    fragment = "engines/rsm/subsurface_frag.glsl"
 
     def defines(self, facts: Facts) -> dict[str, int]:
         return medium_defines(facts)
@@ -348,8 +338,6 @@ class Subsurface(Pass):
     def absent(self, facts: Facts) -> str | None:
         return None if facts.settings.use_translucency else "translucency is switched off"
 
-    def run(self, frame: Frame, planned: Planned) -> None:
-        program = frame.program(planned)
+    def prepare(self, frame: Frame, planned: Planned, program) -> None:
         set_medium(frame, program, planned.facts)
         frame.set(program, rsm_light_count=len(planned.facts.rig.sources))
-        frame.screen(planned, program)

@@ -21,11 +21,21 @@ from ..graph import Optional, Pass, Planned, Texture, Uniform
 from ..passes.ao import AOBlur, AOGeneration
 from ..passes.brdf_tables import BRDFTables
 from ..passes.direct_lighting import DirectLighting, TranslucentLighting
-from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint, _screen
+from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint
 from ..passes.lights import LightList, ShadowMaps
 from ..passes.occupancy import Occupancy
 from ..passes.resolve import Resolve
-from ..passes.smoothing import LIGHT, BlockSmoothing, raw_gather
+from ..passes.screen import (
+    INDIRECT_GLOSSY,
+    LIGHT,
+    LOBE,
+    REFRACTING,
+    TRANSMISSION_INDIRECT,
+    ScreenPass,
+    _screen,
+    no_gloss,
+)
+from ..passes.smoothing import BlockSmoothing, raw_gather
 from ..passes.volumetric import Volumetric
 from ..passes.world_guide import WorldGuide
 from ..passes.world_rays import WorldRays
@@ -86,7 +96,7 @@ def _no_bounce(facts: Facts) -> str | None:
     return "no visible material is diffuse" if not facts.diffuse else None
 
 
-class ScreenPlanes(Pass):
+class ScreenPlanes(ScreenPass):
     """The depth buffer in a form in which planes and rays are linear."""
 
     title = "SSDO Planes"
@@ -95,16 +105,13 @@ class ScreenPlanes(Pass):
         Texture("ssdo.planes", "ssdo_planes", "nearness of the visible surface (1/view depth; orthographic: −view depth) and "
                 "its slope per pixel of the surface's plane", "rgba32f", _screen),
     )  # fmt: skip
-    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/ssdo/planes_frag.glsl"}}
-
-    def run(self, frame: Frame, planned: Planned) -> None:
-        frame.screen(planned, frame.program(planned))
+    fragment = "engines/ssdo/planes_frag.glsl"
 
 
-class SentLight(Pass):
+class SentLight(ScreenPass):
     """What each pixel sends on: direct light, and the bounce before this one."""
 
-    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/ssdo/sent_frag.glsl"}}
+    fragment = "engines/ssdo/sent_frag.glsl"
 
     def __init__(self, bounce: int) -> None:
         self.title = f"SSDO Sent Light {bounce}"
@@ -124,11 +131,8 @@ class SentLight(Pass):
     def absent(self, facts: Facts) -> str | None:
         return _no_bounce(facts)
 
-    def run(self, frame: Frame, planned: Planned) -> None:
-        frame.screen(planned, frame.program(planned))
 
-
-class _Gather(Pass):
+class _Gather(ScreenPass):
     """Light from the screen: ``sent`` is the radiance that pixels send, or their emission, which comes with the world's light."""
 
     uniforms = (
@@ -179,7 +183,7 @@ class InterpolatedIndirect(_Gather):
     """Light from the screen at one pixel per block."""
 
     figure = "SSDO Interpolated Indirect Lighting Computation"
-    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/ssdo/gather_low_frag.glsl"}}
+    fragment = "engines/ssdo/gather_low_frag.glsl"
 
     def __init__(self, sent: str, low: str) -> None:
         self.sent = sent
@@ -195,7 +199,7 @@ class IndirectLighting(_Gather):
     """Light from the screen for every pixel: interpolated where the low resolution has its surface, gathered where not."""
 
     figure = "SSDO Lighting Computation"
-    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/ssdo/lighting_frag.glsl"}}
+    fragment = "engines/ssdo/lighting_frag.glsl"
 
     def __init__(self, sent: str, low: str, target: str) -> None:
         self.sent = sent
@@ -224,7 +228,7 @@ def _read(sent: str) -> str | Optional:
     return sent if sent.startswith("ssdo.") else Optional(sent)
 
 
-class AOScan(Pass):
+class AOScan(ScreenPass):
     """Ambient occlusion from the visibility bitmask, in the place of Mittring's."""
 
     title = "SSDO AO Generation"
@@ -240,13 +244,13 @@ class AOScan(Pass):
         Uniform("ao_distance", "float", "how far an occluder counts, m"),
         Uniform("ao_thickness", "float", "thickness of what the screen shows, as a share of its distance from the receiver"),
     )
-    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/ssdo/ao_scan_frag.glsl"}}
+    fragment = "engines/ssdo/ao_scan_frag.glsl"
 
     def absent(self, facts: Facts) -> str | None:
         return None if facts.settings.use_ao else "ambient occlusion is switched off"
 
-    def run(self, frame: Frame, planned: Planned) -> None:
-        facts, program = planned.facts, frame.program(planned)
+    def prepare(self, frame: Frame, planned: Planned, program) -> None:
+        facts = planned.facts
         frame.set(
             program,
             ao_slices=max(1, facts.settings.ao.samples // 2),
@@ -254,16 +258,9 @@ class AOScan(Pass):
             ao_distance=min(facts.ao_distance, 2.0 * facts.radius),
             ao_thickness=facts.settings.ssdo.thickness,
         )
-        frame.screen(planned, program)
 
 
-def _no_gloss(facts: Facts) -> str | None:
-    if not facts.settings.use_glossy:
-        return "glossy reflections are switched off"
-    return None if facts.glossy else "no visible material is glossy"
-
-
-class ShadedScreen(Pass):
+class ShadedScreen(ScreenPass):
     """What reflections and refractions see of each pixel."""
 
     title = "SSDO Shaded Screen"
@@ -274,10 +271,7 @@ class ShadedScreen(Pass):
         Texture("ssdo.shaded", "ssdo_shaded", "radiance that leaves the surface, without its emission, W/(m²·sr)", "rgba32f",
                 _screen),
     )  # fmt: skip
-    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/ssdo/shaded_frag.glsl"}}
-
-    def run(self, frame: Frame, planned: Planned) -> None:
-        frame.screen(planned, frame.program(planned))
+    fragment = "engines/ssdo/shaded_frag.glsl"
 
 
 class NearnessPyramid(Pass):
@@ -311,12 +305,11 @@ class Reflections(Pass):
 
     title = "SSDO Reflections"
     reads = (
-        "ssdo.planes", "ssdo.pyramid", "ssdo.shaded", "gbuffer.depth", "gbuffer.normal", "gbuffer.specular", "gbuffer.lobe",
-        "brdf.energy", "brdf.average", Optional("gbuffer.emission", ("reflected.sources",)),
+        "ssdo.planes", "ssdo.pyramid", "ssdo.shaded", "gbuffer.depth", "gbuffer.normal", *LOBE,
+        Optional("gbuffer.emission", ("reflected.sources",)),
     )  # fmt: skip
     writes = (
-        Texture("indirect.glossy", "indirect_glossy", "radiance that the glossy lobe reflects of the screen, W/(m²·sr)",
-                "rgba32f", _screen),
+        INDIRECT_GLOSSY,
         Texture("reflected.sources", "reflected_sources", "radiance that it reflects of the world and of emissive pixels",
                 "rgba32f", _screen,
                 when=lambda f: None if _sources_traced(f) else "the world and emissive surfaces shine through shadow maps"),
@@ -327,7 +320,7 @@ class Reflections(Pass):
     shaders = {"main": {"compute": "engines/ssdo/reflections_comp.glsl"}}
 
     def absent(self, facts: Facts) -> str | None:
-        return _no_gloss(facts)
+        return no_gloss(facts)
 
     def defines(self, facts: Facts) -> dict[str, int]:
         return {
@@ -374,16 +367,16 @@ class ScreenShadowLighting(DirectLighting):
     def defines(self, facts: Facts) -> dict[str, int]:
         return {**super().defines(facts), "HAS_SSDO_PLANES": 1}
 
-    def run(self, frame: Frame, planned: Planned) -> None:
+    def prepare(self, frame: Frame, planned: Planned, program) -> None:
         facts = planned.facts
         settings = facts.settings.ssdo
         frame.set(
-            frame.program(planned),
+            program,
             ssdo_shadow_reach=(settings.contact if settings.shadows == "CONTACT" else 2.0) * facts.radius,
             ssdo_shadow_steps=settings.steps,
             ssdo_thickness=settings.thickness,
         )
-        super().run(frame, planned)
+        super().prepare(frame, planned, program)
 
 
 class Refraction(Pass):
@@ -392,14 +385,10 @@ class Refraction(Pass):
     title = "SSDO Refraction"
     figure = "Lighting Computation"
     reads = (
-        "ssdo.planes", "ssdo.pyramid", "ssdo.shaded", "gbuffer.transmission", "translucent.depth", "translucent.normal",
-        "translucent.color", "translucent.medium", "translucent.back_depth", "translucent.back_normal",
+        "ssdo.planes", "ssdo.pyramid", "ssdo.shaded", *REFRACTING,
         Optional("gbuffer.emission"),
     )  # fmt: skip
-    writes = (
-        Texture("transmission.indirect", "transmission_indirect", "radiance through refracting surfaces, tinted; alpha 1 "
-                "where the ray found something", "rgba32f", _screen),
-    )  # fmt: skip
+    writes = (TRANSMISSION_INDIRECT,)
     uniforms = Reflections.uniforms
     shaders = {"main": {"compute": "engines/ssdo/refraction_comp.glsl"}}
 
@@ -409,7 +398,7 @@ class Refraction(Pass):
         frame.compute(planned, program, planned.facts.resolution)
 
 
-class Subsurface(Pass):
+class Subsurface(ScreenPass):
     """Light that entered the surface near by."""
 
     title = "SSDO Subsurface Scattering"
@@ -422,13 +411,10 @@ class Subsurface(Pass):
                 "the surface's colour", "rgba32f", _screen),
         Texture("subsurface.indirect", "subsurface_indirect", "the same of indirect.diffuse", "rgba32f", _screen),
     )  # fmt: skip
-    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "engines/ssdo/subsurface_frag.glsl"}}
+    fragment = "engines/ssdo/subsurface_frag.glsl"
 
     def absent(self, facts: Facts) -> str | None:
         return None if facts.settings.use_translucency else "translucency is switched off"
-
-    def run(self, frame: Frame, planned: Planned) -> None:
-        frame.screen(planned, frame.program(planned))
 
 
 class RadialBlur(Volumetric):
@@ -442,11 +428,11 @@ class RadialBlur(Volumetric):
         maps = {"VOXEL_VISIBILITY": 0, "HAS_LIGHT_VIEWS": 0, "HAS_SHADOW_DEPTH": 0, "HAS_RSM_DEPTH": 0}
         return {"RADIAL_BLUR": int(facts.visible), **maps}
 
-    def run(self, frame: Frame, planned: Planned) -> None:
+    def prepare(self, frame: Frame, planned: Planned, program) -> None:
         if frame.subframe == 0:
             notes = planned.facts.rig.notes
             notes += [n for n in self.unseen(frame, planned.facts) if n not in notes]
-        super().run(frame, planned)
+        super().prepare(frame, planned, program)
 
     @staticmethod
     def unseen(frame: Frame, facts: Facts) -> list[str]:

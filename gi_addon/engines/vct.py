@@ -13,19 +13,27 @@ from ..frame import Frame
 from ..graph import Optional, Pass, Planned, Texture, Uniform
 from ..passes.brdf_tables import BRDFTables
 from ..passes.direct_lighting import DirectLighting, TranslucentLighting
-from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint, _screen
+from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint
 from ..passes.lights import LightList, RSMGeneration, ShadowMaps
 from ..passes.occupancy import Occupancy
 from ..passes.resolve import Resolve
-from ..passes.smoothing import LIGHT, BlockSmoothing, raw_gather
+from ..passes.screen import (
+    INDIRECT_DIFFUSE,
+    INDIRECT_GLOSSY,
+    LOBE,
+    REFRACTING,
+    TRANSMISSION_INDIRECT,
+    ScreenPass,
+    _screen,
+    no_gloss,
+)
+from ..passes.smoothing import BlockSmoothing, raw_gather
 from ..passes.volumetric import MEDIUM_UNIFORMS, Volumetric, medium_defines, set_medium
 from ..passes.voxels import GRID_UNIFORMS, VoxelGrid, Voxelisation, voxel_atlas, voxel_grid
 from ..passes.world_guide import WorldGuide
 from ..passes.world_rays import WorldRays
 from ..settings import Settings
 from .rsm import Subsurface
-
-_FULLSCREEN = "passes/fullscreen_vert.glsl"
 
 
 def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
@@ -176,14 +184,14 @@ def _set_cones(frame: Frame, program, facts: Facts) -> None:
     )  # fmt: skip
 
 
-class InterpolatedIndirect(Pass):
+class InterpolatedIndirect(ScreenPass):
     """Indirect light at one pixel per block."""
 
     title = "Voxel Interpolated Indirect Lighting Computation"
     reads = (*_VOLUMES, "gbuffer.low_depth", "gbuffer.low_normal", "gbuffer.low_pixel")
     writes = raw_gather("indirect.low")
     uniforms = _CONE_UNIFORMS
-    shaders = {"main": {"vertex": _FULLSCREEN, "fragment": "engines/vct/gather_low_frag.glsl"}}
+    fragment = "engines/vct/gather_low_frag.glsl"
 
     def defines(self, facts: Facts) -> dict[str, int]:
         return {"GATHER_SCALE": facts.settings.gather_scale}
@@ -193,13 +201,11 @@ class InterpolatedIndirect(Pass):
             return "every pixel gathers for itself"
         return _bounce_off(facts)
 
-    def run(self, frame: Frame, planned: Planned) -> None:
-        program = frame.program(planned)
+    def prepare(self, frame: Frame, planned: Planned, program) -> None:
         _set_cones(frame, program, planned.facts)
-        frame.screen(planned, program)
 
 
-class IndirectLighting(Pass):
+class IndirectLighting(ScreenPass):
     """Indirect light of every pixel: interpolated where the low resolution has its surface, by cones where not."""
 
     title = "Voxel Lighting Computation"
@@ -208,12 +214,9 @@ class IndirectLighting(Pass):
         *_VOLUMES, "gbuffer.depth", "gbuffer.normal", Optional("gbuffer.low_depth"), Optional("gbuffer.low_normal"),
         Optional("gbuffer.low_pixel"), Optional("indirect.low"), Optional("indirect.low.direction"),
     )  # fmt: skip
-    writes = (
-        Texture("indirect.diffuse", "indirect_diffuse", LIGHT, "rgba32f", _screen,
-                when=lambda f: None if f.diffuse else "no visible material is diffuse"),
-    )  # fmt: skip
+    writes = (INDIRECT_DIFFUSE,)
     uniforms = _CONE_UNIFORMS
-    shaders = {"main": {"vertex": _FULLSCREEN, "fragment": "engines/vct/lighting_frag.glsl"}}
+    fragment = "engines/vct/lighting_frag.glsl"
 
     def defines(self, facts: Facts) -> dict[str, int]:
         return {"GATHER_SCALE": facts.settings.gather_scale}
@@ -221,13 +224,11 @@ class IndirectLighting(Pass):
     def absent(self, facts: Facts) -> str | None:
         return _bounce_off(facts)
 
-    def run(self, frame: Frame, planned: Planned) -> None:
-        program = frame.program(planned)
+    def prepare(self, frame: Frame, planned: Planned, program) -> None:
         _set_cones(frame, program, planned.facts)
-        frame.screen(planned, program)
 
 
-class VoxelAO(Pass):
+class VoxelAO(ScreenPass):
     """Ambient occlusion by short cones."""
 
     title = "Voxel Ambient Occlusion"
@@ -237,44 +238,31 @@ class VoxelAO(Pass):
         Texture("ao", "ao", "ambient occlusion within the AO distance; 1; 1 = open", "rg16f", _screen),
     )  # fmt: skip
     uniforms = (*_CONE_UNIFORMS, Uniform("ao_distance", "float", "how far an occluder counts, m"))
-    shaders = {"main": {"vertex": _FULLSCREEN, "fragment": "engines/vct/ao_frag.glsl"}}
+    fragment = "engines/vct/ao_frag.glsl"
 
     def absent(self, facts: Facts) -> str | None:
         return None if facts.settings.use_ao else "ambient occlusion is switched off"
 
-    def run(self, frame: Frame, planned: Planned) -> None:
-        program = frame.program(planned)
+    def prepare(self, frame: Frame, planned: Planned, program) -> None:
         _set_cones(frame, program, planned.facts)
         frame.set(program, ao_distance=min(planned.facts.ao_distance, 2.0 * planned.facts.radius))
-        frame.screen(planned, program)
 
 
-class GlossyCones(Pass):
+class GlossyCones(ScreenPass):
     """What glossy surfaces mirror: one cone a sub-frame, as wide as the lobe's share."""
 
     title = "Voxel Glossy Reflections"
     figure = "Voxel Lighting Computation"
-    reads = (
-        *_VOLUMES, "voxels.albedo", "gbuffer.depth", "gbuffer.normal", "gbuffer.specular", "gbuffer.lobe", "brdf.energy", "brdf.average",
-    )  # fmt: skip
-    writes = (
-        Texture("indirect.glossy", "indirect_glossy", "radiance reflected by the glossy lobe, with its colour, W/(m²·sr)",
-                "rgba32f", _screen),
-    )  # fmt: skip
+    reads = (*_VOLUMES, "voxels.albedo", "gbuffer.depth", "gbuffer.normal", *LOBE)
+    writes = (INDIRECT_GLOSSY,)
     uniforms = _CONE_UNIFORMS
-    shaders = {"main": {"vertex": _FULLSCREEN, "fragment": "engines/vct/glossy_frag.glsl"}}
+    fragment = "engines/vct/glossy_frag.glsl"
 
     def absent(self, facts: Facts) -> str | None:
-        if not facts.settings.use_glossy:
-            return "glossy reflections are switched off"
-        if not facts.glossy:
-            return "no visible material is glossy"
-        return _bounce_off(facts)
+        return no_gloss(facts) or _bounce_off(facts)
 
-    def run(self, frame: Frame, planned: Planned) -> None:
-        program = frame.program(planned)
+    def prepare(self, frame: Frame, planned: Planned, program) -> None:
         _set_cones(frame, program, planned.facts)
-        frame.screen(planned, program)
 
 
 class ShadowCones(Pass):
@@ -302,29 +290,21 @@ class ShadowCones(Pass):
         frame.compute(planned, program, planned.facts.resolution)
 
 
-class RefractionCones(Pass):
+class RefractionCones(ScreenPass):
     """What is seen through refracting and translucent surfaces, by cones."""
 
     title = "Voxel Translucency"
     figure = "Voxel Lighting Computation"
-    reads = (
-        *_VOLUMES, "voxels.albedo", "gbuffer.transmission", "translucent.depth", "translucent.normal", "translucent.color",
-        "translucent.medium", "translucent.back_depth", "translucent.back_normal",
-    )  # fmt: skip
-    writes = (
-        Texture("transmission.indirect", "transmission_indirect", "radiance through refracting surfaces, tinted; alpha 1 "
-                "where the cone met something", "rgba32f", _screen),
-    )  # fmt: skip
+    reads = (*_VOLUMES, "voxels.albedo", *REFRACTING)
+    writes = (TRANSMISSION_INDIRECT,)
     uniforms = _CONE_UNIFORMS
-    shaders = {"main": {"vertex": _FULLSCREEN, "fragment": "engines/vct/refraction_frag.glsl"}}
+    fragment = "engines/vct/refraction_frag.glsl"
 
     def absent(self, facts: Facts) -> str | None:
         return _bounce_off(facts)
 
-    def run(self, frame: Frame, planned: Planned) -> None:
-        program = frame.program(planned)
+    def prepare(self, frame: Frame, planned: Planned, program) -> None:
         _set_cones(frame, program, planned.facts)
-        frame.screen(planned, program)
 
 
 class VoxelVolumetric(Volumetric):
@@ -343,6 +323,6 @@ class VoxelVolumetric(Volumetric):
             "HAS_LIGHT_VIEWS": 0, "HAS_SHADOW_DEPTH": 0, "HAS_RSM_DEPTH": 0,
         }  # fmt: skip
 
-    def run(self, frame: Frame, planned: Planned) -> None:
-        _set_cones(frame, frame.program(planned), planned.facts)
-        super().run(frame, planned)
+    def prepare(self, frame: Frame, planned: Planned, program) -> None:
+        _set_cones(frame, program, planned.facts)
+        super().prepare(frame, planned, program)

@@ -103,18 +103,14 @@ def beside(context, area) -> bpy.types.Window:
 
 def _link_alike(scene: bpy.types.Scene, twin: bpy.types.Scene) -> None:
     """Make ``twin`` show what ``scene`` does, in Cycles and with the same view transform."""
-    for collection in list(twin.collection.children):
-        if collection.name not in scene.collection.children:
-            twin.collection.children.unlink(collection)
-    for collection in scene.collection.children:
-        if collection.name not in twin.collection.children:
-            twin.collection.children.link(collection)
-    for obj in list(twin.collection.objects):
-        if obj.name not in scene.collection.objects:
-            twin.collection.objects.unlink(obj)
-    for obj in scene.collection.objects:
-        if obj.name not in twin.collection.objects:
-            twin.collection.objects.link(obj)
+    for shown, wanted in ((twin.collection.children, scene.collection.children),
+                          (twin.collection.objects, scene.collection.objects)):  # fmt: skip
+        for item in list(shown):
+            if item.name not in wanted:
+                shown.unlink(item)
+        for item in wanted:
+            if item.name not in shown:
+                shown.link(item)
     twin.world, twin.camera = scene.world, scene.camera
     twin.frame_set(scene.frame_current)
     for name in ("resolution_x", "resolution_y", "resolution_percentage", "film_transparent", "pixel_aspect_x",
@@ -125,14 +121,6 @@ def _link_alike(scene: bpy.types.Scene, twin: bpy.types.Scene) -> None:
     twin.render.engine = "CYCLES"
 
 
-_CLASSES = (QUARTET_OT_preset, QUARTET_MT_presets, QUARTET_OT_add_preset, QUARTET_OT_split_view)
-
-
-def register() -> None:
-    for cls in _CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister() -> None:
-    for cls in reversed(_CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = bpy.utils.register_classes_factory(
+    (QUARTET_OT_preset, QUARTET_MT_presets, QUARTET_OT_add_preset, QUARTET_OT_split_view)
+)

@@ -71,14 +71,4 @@ def draw(layout) -> None:
         box.label(text=line)
 
 
-_CLASSES = (QUARTET_OT_check_driver, QUARTET_OT_copy_log, QuartetPreferences)
-
-
-def register() -> None:
-    for cls in _CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister() -> None:
-    for cls in reversed(_CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = bpy.utils.register_classes_factory((QUARTET_OT_check_driver, QUARTET_OT_copy_log, QuartetPreferences))

@@ -5,12 +5,12 @@ from __future__ import annotations
 
 from ..facts import Facts
 from ..frame import Frame
-from ..graph import Optional, Pass, Planned, Texture, Uniform
-from .gbuffer import _screen
+from ..graph import Optional, Planned, Texture, Uniform
 from .occupancy import CELL_UNIFORMS, cell_grid, set_cells
+from .screen import ScreenPass, _screen
 
 
-class AOGeneration(Pass):
+class AOGeneration(ScreenPass):
     """Occluders near by, from the screen; farther ones too, from the grid of cells if ``cells``."""
 
     title = "AO Generation"
@@ -27,7 +27,7 @@ class AOGeneration(Pass):
         Uniform("ao_contact", "float", "how far one dims untested indirect light, m"),
         *CELL_UNIFORMS,
     )
-    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "passes/ao_frag.glsl"}}
+    fragment = "passes/ao_frag.glsl"
 
     def __init__(self, *, cells: bool = False) -> None:
         if cells:
@@ -39,8 +39,7 @@ class AOGeneration(Pass):
     def absent(self, facts: Facts) -> str | None:
         return None if facts.settings.use_ao else "ambient occlusion is switched off"
 
-    def run(self, frame: Frame, planned: Planned) -> None:
-        program = frame.program(planned)
+    def prepare(self, frame: Frame, planned: Planned, program) -> None:
         facts = planned.facts
         frame.set(
             program,
@@ -52,7 +51,6 @@ class AOGeneration(Pass):
         )
         if planned.has("occupancy"):
             set_cells(frame, program, facts)
-        frame.screen(planned, program)
 
 
 def _contact(facts: Facts) -> float:
@@ -64,7 +62,7 @@ def _contact(facts: Facts) -> float:
     return contact
 
 
-class AOBlur(Pass):
+class AOBlur(ScreenPass):
     title = "Gaussian Blur"
     figure = "Gaussian Blur"
     reads = ("ao.raw", "gbuffer.depth", "gbuffer.normal")
@@ -72,7 +70,4 @@ class AOBlur(Pass):
         Texture("ao", "ao", "ambient occlusion within the AO distance; and of near contacts; 1 = open", "rg16f",
                 _screen, scratch=True),
     )  # fmt: skip
-    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "passes/ao_blur_frag.glsl"}}
-
-    def run(self, frame: Frame, planned: Planned) -> None:
-        frame.screen(planned, frame.program(planned))
+    fragment = "passes/ao_blur_frag.glsl"

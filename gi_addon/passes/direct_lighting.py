@@ -5,13 +5,14 @@ from __future__ import annotations
 
 from ..facts import Facts
 from ..frame import Frame
-from ..graph import Optional, Pass, Planned, Texture, Uniform
+from ..graph import Optional, Planned, Texture, Uniform
 from ..sequence import sobol_2d
-from .gbuffer import _nothing_refracts, _screen
+from .gbuffer import _nothing_refracts
+from .screen import LIGHT, ScreenPass, _screen
 from .volumetric import MEDIUM_UNIFORMS, medium_defines, set_medium
 
 
-class DirectLighting(Pass):
+class DirectLighting(ScreenPass):
     title = "Direct Lighting Computation"
     figure = "Direct Lighting Computation"
     reads = (
@@ -23,7 +24,7 @@ class DirectLighting(Pass):
         Optional("screen.light", ("direct.diffuse",)), Optional("world.difference", ("direct.diffuse",)),
     )  # fmt: skip
     writes = (
-        Texture("direct.diffuse", "direct_diffuse", "radiance a white Lambert surface would reflect, W/(m²·sr)",
+        Texture("direct.diffuse", "direct_diffuse", LIGHT,
                 "rgba32f", _screen, when=lambda f: None if f.diffuse else "no visible material is diffuse"),
         Texture("direct.glossy", "direct_glossy", "radiance reflected by the glossy lobe, W/(m²·sr)", "rgba32f",
                 _screen, when=lambda f: None if f.glossy else "no visible material is glossy"),
@@ -36,7 +37,7 @@ class DirectLighting(Pass):
         Uniform("filter_turn", "float", "rotation of the shadow filter in this sub-frame, rad"),
         *MEDIUM_UNIFORMS,
     )
-    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "passes/direct_lighting_frag.glsl"}}
+    fragment = "passes/direct_lighting_frag.glsl"
 
     def defines(self, facts: Facts) -> dict[str, int]:
         return {**medium_defines(facts), "HAS_SSDO_PLANES": 0}
@@ -44,8 +45,7 @@ class DirectLighting(Pass):
     def absent(self, facts: Facts) -> str | None:
         return None if facts.lit else "no light shines"
 
-    def run(self, frame: Frame, planned: Planned) -> None:
-        program = frame.program(planned)
+    def prepare(self, frame: Frame, planned: Planned, program) -> None:
         set_medium(frame, program, planned.facts)
         frame.set(
             program,
@@ -53,10 +53,9 @@ class DirectLighting(Pass):
             softness=planned.facts.settings.shadows.softness,
             filter_turn=float(sobol_2d(frame.subframe, 3)[0]) * 6.2831853,
         )
-        frame.screen(planned, program)
 
 
-class TranslucentLighting(Pass):
+class TranslucentLighting(ScreenPass):
     """Direct light through surfaces that scatter it to their other side."""
 
     title = "Translucent Direct Lighting"
@@ -70,7 +69,7 @@ class TranslucentLighting(Pass):
                 "alpha 1 where the surface scatters, 0 where it refracts", "rgba32f", _screen),
     )  # fmt: skip
     uniforms = DirectLighting.uniforms
-    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "passes/translucent_light_frag.glsl"}}
+    fragment = "passes/translucent_light_frag.glsl"
 
     def defines(self, facts: Facts) -> dict[str, int]:
         return medium_defines(facts)
@@ -78,5 +77,4 @@ class TranslucentLighting(Pass):
     def absent(self, facts: Facts) -> str | None:
         return _nothing_refracts(facts) or (None if facts.lit else "no light shines")
 
-    def run(self, frame: Frame, planned: Planned) -> None:
-        DirectLighting.run(self, frame, planned)
+    prepare = DirectLighting.prepare

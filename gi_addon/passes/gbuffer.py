@@ -10,12 +10,9 @@ from ..facts import Facts
 from ..frame import Frame
 from ..graph import Optional, Pass, Planned, Texture
 from ..scene import CAMERA
+from .screen import ScreenPass, _screen
 
 BACKGROUND_DEPTH = 0.0  # no surface: view depths are positive
-
-
-def _screen(facts: Facts) -> tuple[int, int]:
-    return facts.resolution
 
 
 def gather_size(facts: Facts) -> tuple[int, int]:
@@ -176,7 +173,7 @@ def _draw_translucent(
     )  # fmt: skip
 
 
-class GBufferMips(Pass):
+class GBufferMips(ScreenPass):
     """One representative pixel per block, for passes at low resolution.
 
     Averages of positions and normals across an edge belong to no surface; a pixel does. Blocks take their nearest and
@@ -194,10 +191,7 @@ class GBufferMips(Pass):
         Texture("gbuffer.low_pixel", "low_pixel", "its place in the block, (x + ½, y + ½) / scale", "rg8", gather_size,
                 scratch=True),
     )  # fmt: skip
-    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "passes/gbuffer_mips_frag.glsl"}}
+    fragment = "passes/gbuffer_mips_frag.glsl"
 
     def defines(self, facts: Facts) -> dict[str, int]:
         return {"GATHER_SCALE": facts.settings.gather_scale}
-
-    def run(self, frame: Frame, planned: Planned) -> None:
-        frame.screen(planned, frame.program(planned))

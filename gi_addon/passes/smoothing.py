@@ -4,26 +4,26 @@
 from __future__ import annotations
 
 from ..facts import Facts
-from ..frame import Frame
-from ..graph import Pass, Planned, Texture
+from ..graph import Texture
 from .gbuffer import gather_size
+from .screen import LIGHT, ScreenPass
 
-LIGHT = "radiance a white Lambert surface would reflect, W/(m²·sr)"
 _DIRECTION = "Σ luminance × direction, and Σ luminance, of what arrives"
 
 
 def raw_gather(low: str) -> tuple[Texture, Texture]:
     """What a low-resolution gather writes for ``BlockSmoothing(low)``."""
     return (
-        Texture(f"{low}.raw", "raw_indirect", LIGHT, "rgba32f", gather_size, scratch=True),
+        Texture(f"{low}.raw", "raw_indirect", f"{LIGHT}; mean of 1/distance of what it comes from, 1/m (0: not known)",
+                "rgba32f", gather_size, scratch=True),
         Texture(f"{low}.raw_direction", "raw_direction", _DIRECTION, "rgba32f", gather_size, scratch=True),
     )
 
 
-class BlockSmoothing(Pass):
+class BlockSmoothing(ScreenPass):
     """Neighbouring blocks of one surface share their directions: ``low``.raw becomes ``low``, for passes/interpolate.glsl."""
 
-    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "passes/smooth_blocks_frag.glsl"}}
+    fragment = "passes/smooth_blocks_frag.glsl"
 
     def __init__(self, low: str, title: str, figure: str = "") -> None:
         self.title, self.figure = title, figure
@@ -35,6 +35,3 @@ class BlockSmoothing(Pass):
 
     def defines(self, facts: Facts) -> dict[str, int]:
         return {"GATHER_SCALE": facts.settings.gather_scale}
-
-    def run(self, frame: Frame, planned: Planned) -> None:
-        frame.screen(planned, frame.program(planned))

@@ -9,10 +9,10 @@ import numpy as np
 
 from ..facts import Facts
 from ..frame import Frame
-from ..graph import Optional, Pass, Planned, Texture, Uniform
+from ..graph import Optional, Planned, Texture, Uniform
 from ..materials import Medium
 from ..sequence import sobol_2d
-from .gbuffer import _screen
+from .screen import ScreenPass, _screen
 
 _EVERYWHERE = 1e30
 
@@ -61,7 +61,7 @@ def set_medium(frame: Frame, program, facts: Facts) -> None:
         )
 
 
-class Volumetric(Pass):
+class Volumetric(ScreenPass):
     """In-scattered light and transmittance of every pixel's ray."""
 
     title = "Volumetric Lighting Computation"
@@ -84,7 +84,7 @@ class Volumetric(Pass):
         Uniform("step_count", "int", "points tested on each ray for each light"),
         Uniform("step_turn", "float", "where in its stratum each point lies in this sub-frame, [0, 1)"),
     )
-    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "passes/volumetric_frag.glsl"}}
+    fragment = "passes/volumetric_frag.glsl"
 
     def defines(self, facts: Facts) -> dict[str, int]:
         return {"RADIAL_BLUR": 0, "VOXEL_VISIBILITY": 0}
@@ -94,8 +94,7 @@ class Volumetric(Pass):
             return "volumetric light is switched off"
         return None if air(facts) is not None else "the world has no volume, and volume.density is 0"
 
-    def run(self, frame: Frame, planned: Planned) -> None:
-        program = frame.program(planned)
+    def prepare(self, frame: Frame, planned: Planned, program) -> None:
         facts = planned.facts
         medium = air(facts).medium
         set_medium(frame, program, facts)
@@ -108,4 +107,3 @@ class Volumetric(Pass):
             step_count=facts.settings.volume.samples,
             step_turn=float(sobol_2d(frame.subframe, 8)[0]),
         )
-        frame.screen(planned, program)

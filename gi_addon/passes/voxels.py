@@ -25,8 +25,8 @@ from ..scene import DIFFUSE
 
 # Sums are fixed point: this many units are one cell face of area. 32 bits then hold 4096 layers of surface in one cell.
 UNITS = 1 << 20
-# Words per cell: area, area × opacity, albedo; of each of six sheets its area, slopes and height; squares covered; diffuse share; emission;
-# area of lamps by side.
+# Words per cell: area, area × opacity, albedo; of each of six sheets its area, slopes and height; squares covered; how much of
+# what is reflected is diffuse; emission; area of lamps by side.
 _WORDS, _EMISSION_WORDS, _LAMP_WORDS = 33, 3, 6
 # For the sums of the layers that are made at once; OpenGL 4.3 promises storage blocks of no more than 128 MiB.
 _SLAB_BYTES = 128 * MIB

@@ -15,10 +15,10 @@ from ..facts import Facts
 from ..frame import Frame
 from ..gl.structs import struct
 from ..gpu_types import LIGHT_WORLD
-from ..graph import Buffer, Optional, Pass, Planned, Texture, Uniform
+from ..graph import Buffer, Optional, Planned, Texture, Uniform
 from ..sequence import sobol_2d
-from .gbuffer import _screen
 from .occupancy import CELL_UNIFORMS, set_cells
+from .screen import ScreenPass, _screen
 from .volumetric import MEDIUM_UNIFORMS, medium_defines, set_medium
 
 # `direction_ws` towards the sky; `emission` is the irradiance that the direction stands for, W/m², negative for those of
@@ -37,7 +37,7 @@ def ray_count(facts: Facts) -> int:
     return facts.settings.world.rays + _SHIFTS * sum(s.kind == LIGHT_WORLD for s in facts.rig.sources)
 
 
-class WorldRays(Pass):
+class WorldRays(ScreenPass):
     """The rays' light less that of the shadow maps' directions, weighted."""
 
     title = "World Rays"
@@ -48,7 +48,7 @@ class WorldRays(Pass):
         Buffer("world.rays", "world_rays", "directions of this sub-frame", "WorldRay", WORLD_RAY, ray_count, scratch=True),
     )  # fmt: skip
     uniforms = (Uniform("ray_count", "int", "rays in the list"), *CELL_UNIFORMS, *MEDIUM_UNIFORMS)
-    shaders = {"main": {"vertex": "passes/fullscreen_vert.glsl", "fragment": "passes/world_rays_frag.glsl"}}
+    fragment = "passes/world_rays_frag.glsl"
 
     def defines(self, facts: Facts) -> dict[str, int]:
         return medium_defines(facts)
@@ -62,14 +62,12 @@ class WorldRays(Pass):
             return "no visible material is diffuse"
         return None if facts.settings.world.rays else "world.rays is 0"
 
-    def run(self, frame: Frame, planned: Planned) -> None:
+    def prepare(self, frame: Frame, planned: Planned, program) -> None:
         facts = planned.facts
         frame.upload("world.rays", self.directions(frame, facts))
-        program = frame.program(planned)
         frame.set(program, ray_count=ray_count(facts))
         set_cells(frame, program, facts)
         set_medium(frame, program, facts)
-        frame.screen(planned, program)
 
     @staticmethod
     def directions(frame: Frame, facts: Facts) -> np.ndarray:

@@ -1,6 +1,7 @@
 // A fixed amount of work that tells this machine from another, and a warm one from a cold one.
 //
-// arithmetic: 512 rounds of 4 × 4 independent fused multiply-adds for each invocation, 16 384 floating-point operations;
+// arithmetic: 512 rounds of 4 × 4 independent fused multiply-adds for each invocation, 16 384 floating-point operations
+// whose factors only keep the numbers from growing and from vanishing;
 // bandwidth: each invocation moves 64 bytes in and 64 bytes out, neighbours side by side.
 
 layout(local_size_x = 64) in;

@@ -23,6 +23,14 @@ struct Lobe {
     float multiscatter;
 };
 
+// As the G-buffer keeps it: (f0, roughness) and (eta, f90, multiscatter).
+Lobe lobe_unpack(vec4 specular, vec4 packed_lobe)
+{
+    return Lobe(specular.rgb, packed_lobe.g, specular.a, packed_lobe.r, packed_lobe.b);
+}
+
+bool lobe_reflects(Lobe lobe) { return max3(lobe.f0) > 0.0 || lobe.f90 > 0.0; }
+
 float f0_from_ior(float ior) { return sqr((ior - 1.0) / (ior + 1.0)); }
 
 float ior_from_f0(float f0)
@@ -81,6 +89,14 @@ float ggx_lambda(float cos_n, float alpha)
 {
     float tan2 = max(1.0 / max(sqr(cos_n), 1e-20) - 1.0, 0.0);
     return 0.5 * (sqrt(1.0 + sqr(alpha) * tan2) - 1.0);
+}
+
+// G2/G1: what is left of the Fresnel term as the weight of a direction sampled by ggx_sample_visible_normal (E. Heitz, "Sampling
+// the GGX Distribution of Visible Normals", JCGT 7(4), 2018).
+float ggx_visible_weight(float cos_v, float cos_l, float alpha)
+{
+    float lambda_v = ggx_lambda(cos_v, alpha);
+    return (1.0 + lambda_v) / (1.0 + lambda_v + ggx_lambda(cos_l, alpha));
 }
 
 // BRDF × cosθ_l for one direction of light, without the multiple-bounce gain.

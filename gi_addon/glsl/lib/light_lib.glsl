@@ -33,6 +33,12 @@ vec3 light_intensity(Light light, vec3 direction_ws)
 
 bool light_is_directional(Light light) { return light.kind == LIGHT_SUN || light.kind == LIGHT_WORLD; }
 
+// How far light has come to a point: 1e30 m from infinitely far away.
+float light_distance(Light light, vec3 position_ws)
+{
+    return light_is_directional(light) ? 1e30 : length(light.position_ws - position_ws);
+}
+
 // Light arriving at a point: unit vector towards it in `l`; returns irradiance on a surface facing it, W/m². `angle` is
 // the angular radius of the patch of the source that this point stands for.
 vec3 light_arriving(Light light, vec3 position_ws, out vec3 l, out float angle)

@@ -14,6 +14,18 @@ float cell_exit(vec3 p, vec3 inverse, vec3 forward, float size)
     return min(t.x, min(t.y, t.z));
 }
 
+// What the grid holds at `p` (in cells): 0 a surface, else 1 + log2 of the edge of the largest empty block around.
+float cells_level(vec3 p)
+{
+    return floor(texelFetch(occupancy, clamp(ivec3(floor(p)), ivec3(0), textureSize(occupancy, 0) - 1), 0).r * 255.0 + 0.5);
+}
+
+// From `p` just past the block that `p` lies in.
+float cells_step(vec3 p, vec3 inverse, vec3 forward, float level)
+{
+    return max(cell_exit(p, inverse, forward, exp2(max(level - 1.0, 0.0))), 0.0) + 1e-3;
+}
+
 // A surface's point lifted clear of the cells that the surface fills.
 vec3 cells_clear(vec3 position_ws, vec3 n) { return position_ws + n * (dot(abs(n), vec3(1.0)) * cell_size); }
 
@@ -29,7 +41,6 @@ bool cells_block(vec3 from_ws, vec3 to_ws)
     direction = mix(direction, vec3(1e-6), lessThan(abs(direction), vec3(1e-6)));
     vec3 inverse = 1.0 / direction;
     vec3 forward = step(0.0, direction);
-    ivec3 last = textureSize(occupancy, 0) - 1;
     float t = 0.0;
     bool free_before = false;
     bool inside = false;
@@ -37,12 +48,12 @@ bool cells_block(vec3 from_ws, vec3 to_ws)
     for (int i = 0; i < CELL_STEPS; ++i) {
         if (t < far && !blocked) {
             vec3 p = start + direction * t;
-            float level = floor(texelFetch(occupancy, clamp(ivec3(floor(p)), ivec3(0), last), 0).r * 255.0 + 0.5);
+            float level = cells_level(p);
             bool solid = level < 0.5;
             blocked = !solid && inside;
             inside = inside || (solid && free_before);
             free_before = free_before || !solid;
-            t += max(cell_exit(p, inverse, forward, exp2(max(level - 1.0, 0.0))), 0.0) + 1e-3;
+            t += cells_step(p, inverse, forward, level);
         } else {
             break;
         }
@@ -69,7 +80,6 @@ vec3 cells_first(vec3 from_ws, vec3 direction, float after)
     vec3 inverse = 1.0 / direction;
     vec3 forward = step(0.0, direction);
     vec2 span = cells_span(start, inverse);
-    ivec3 last = textureSize(occupancy, 0) - 1;
     float skip = after / cell_size;
     float t = max(span.x, skip) + 1e-3;
     float open_ = span.x > skip ? skip : -1.0;
@@ -77,9 +87,9 @@ vec3 cells_first(vec3 from_ws, vec3 direction, float after)
     for (int i = 0; i < CELL_STEPS; ++i) {
         if (t < span.y && hit.x < 0.0) {
             vec3 p = start + direction * t;
-            float level = floor(texelFetch(occupancy, clamp(ivec3(floor(p)), ivec3(0), last), 0).r * 255.0 + 0.5);
+            float level = cells_level(p);
             bool solid = level < 0.5;
-            float next = t + max(cell_exit(p, inverse, forward, exp2(max(level - 1.0, 0.0))), 0.0) + 1e-3;
+            float next = t + cells_step(p, inverse, forward, level);
             hit = solid && open_ >= 0.0 ? vec2(t, next) : hit;
             open_ = open_ < 0.0 && !solid ? t : open_;
             t = next;
@@ -100,25 +110,9 @@ float cells_distance(vec3 from_ws, vec3 direction) { return cells_first(from_ws,
 // Whether a ray along the unit `direction` leaves the grid through free cells only; one that starts in a surface's does not.
 bool cells_open(vec3 from_ws, vec3 direction)
 {
-    vec3 start = (from_ws - cell_origin_ws) / cell_size;
-    direction = mix(direction, vec3(1e-6), lessThan(abs(direction), vec3(1e-6)));
-    vec3 inverse = 1.0 / direction;
-    vec3 forward = step(0.0, direction);
-    vec2 span = cells_span(start, inverse);
-    ivec3 last = textureSize(occupancy, 0) - 1;
-    float t = span.x + 1e-3;
-    bool open = true;
-    for (int i = 0; i < CELL_STEPS; ++i) {
-        if (t < span.y && open) {
-            vec3 p = start + direction * t;
-            float level = floor(texelFetch(occupancy, clamp(ivec3(floor(p)), ivec3(0), last), 0).r * 255.0 + 0.5);
-            open = level > 0.5;
-            t += max(cell_exit(p, inverse, forward, exp2(max(level - 1.0, 0.0))), 0.0) + 1e-3;
-        } else {
-            break;
-        }
-    }
-    return open && t >= span.y;
+    vec3 start = (from_ws - cell_origin_ws) / cell_size + direction * 1e-3;
+    bool within = all(greaterThanEqual(start, vec3(0.0))) && all(lessThan(start, vec3(textureSize(occupancy, 0))));
+    return !(within && cells_level(start) < 0.5) && cells_distance(from_ws, direction) < 0.0;
 }
 
 // The next run of occupied cells along a ray in cells (`direction` a unit vector without zeros) that free cells come before,
@@ -127,14 +121,13 @@ bool cells_next_run(vec3 start, vec3 direction, float far, inout float t, inout 
 {
     vec3 inverse = 1.0 / direction;
     vec3 forward = step(0.0, direction);
-    ivec3 last = textureSize(occupancy, 0) - 1;
     bool inside = false;
     bool left = false;
     run = vec2(far);
     for (int i = 0; i < CELL_STEPS; ++i) {
         if (t < far && !left) {
             vec3 p = start + direction * t;
-            float level = floor(texelFetch(occupancy, clamp(ivec3(floor(p)), ivec3(0), last), 0).r * 255.0 + 0.5);
+            float level = cells_level(p);
             bool solid = level < 0.5;
             if (solid && free_before && !inside) {
                 inside = true;
@@ -144,7 +137,7 @@ bool cells_next_run(vec3 start, vec3 direction, float far, inout float t, inout 
             if (left) {
                 run.y = t;
             } else {
-                t += max(cell_exit(p, inverse, forward, exp2(max(level - 1.0, 0.0))), 0.0) + 1e-3;
+                t += cells_step(p, inverse, forward, level);
             }
             free_before = free_before || !solid;
         } else {

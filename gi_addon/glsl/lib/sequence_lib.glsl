@@ -25,6 +25,9 @@ uint owen_scramble(uint x, uint seed)
 
 float unit_float(uint x) { return float(x >> 8) * (1.0 / 16777216.0); }
 
+// A pixel's own shift of the sequence (R. Cranley and T. Patterson, SIAM J. Numer. Anal. 13, 1976): fract(point + shift).
+vec2 unit_shift(uint seed) { return vec2(unit_float(seed), unit_float(hash_u32(seed))); }
+
 // Points in [0, 1)²; `seed` names the purpose.
 vec2 sobol_2d(uint index, uint seed)
 {

@@ -199,3 +199,50 @@ float light_visibility(sampler2D map, Light light, LightView v, vec3 position_ws
     float d = texelFetch(map, ivec2(floor(texel)), 0).r;
     return d == 0.0 || d >= p.z - light_view_texel_width(v, p.z) ? 1.0 : 0.0;
 }
+
+// The same by whichever map of the light sees the point. Included where HAS_SHADOW_DEPTH and HAS_RSM_DEPTH say which there are.
+float light_share(Light light, vec3 position_ws, vec3 ng, float softness, float turn)
+{
+    if (light.views <= 0) {
+        return 1.0;
+    }
+    LightView v = light_views[light_view_of(light, position_ws)];
+#if HAS_SHADOW_DEPTH
+    if (v.map == MAP_SHADOW) {
+        return light_visibility(shadow_depth, light, v, position_ws, ng, softness, turn);
+    }
+#endif
+#if HAS_RSM_DEPTH
+    if (v.map == MAP_BOUNCE) {
+        return light_visibility(rsm_depth, light, v, position_ws, ng, softness, turn);
+    }
+#endif
+    return 1.0;
+}
+
+// The same for a point of the air, by its texel's depth alone: sub-frames blur it.
+float air_share(Light light, vec3 position_ws)
+{
+    if (light.views <= 0) {
+        return 1.0;
+    }
+    LightView v = light_views[light_view_of(light, position_ws)];
+    vec3 p = light_view_project(v, position_ws);
+    vec2 unit = p.xy / v.guard;
+    if (any(greaterThan(abs(unit), vec2(1.0))) || p.z <= v.near) {
+        return 1.0;
+    }
+    ivec2 texel = ivec2(v.rect.xy + (unit * 0.5 + 0.5) * v.rect.zw);
+    float d = 0.0;
+#if HAS_SHADOW_DEPTH
+    if (v.map == MAP_SHADOW) {
+        d = texelFetch(shadow_depth, texel, 0).r;
+    }
+#endif
+#if HAS_RSM_DEPTH
+    if (v.map == MAP_BOUNCE) {
+        d = texelFetch(rsm_depth, texel, 0).r;
+    }
+#endif
+    return d == 0.0 || d >= p.z ? 1.0 : 0.0;
+}

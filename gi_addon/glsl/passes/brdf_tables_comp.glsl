@@ -29,8 +29,7 @@ vec2 directional(float roughness, float cos_v, float eta)
         vec3 h = ggx_sample_visible_normal(v, alpha, sobol_2d(i, 7u));
         vec3 l = reflect(-v, h);
         if (l.z > 0.0) {
-            float lambda_v = ggx_lambda(cos_v, alpha);
-            float weight = (1.0 + lambda_v) / (1.0 + lambda_v + ggx_lambda(l.z, alpha));
+            float weight = ggx_visible_weight(cos_v, l.z, alpha);
             sum += vec2(fresnel_curve(saturate(dot(v, h)), eta), weight);
         }
     }

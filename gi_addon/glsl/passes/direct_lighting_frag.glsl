@@ -38,11 +38,9 @@ void main()
         vec3 ng = octahedral_decode(normals.zw);
         vec3 v = view_direction_ws(uv);
 #if HAS_DIRECT_GLOSSY
-        vec4 specular = texelFetch(gbuf_specular, pixel, 0);
-        vec4 packed_lobe = texelFetch(gbuf_lobe, pixel, 0);
-        Lobe lobe = Lobe(specular.rgb, packed_lobe.g, specular.a, packed_lobe.r, packed_lobe.b);
+        Lobe lobe = lobe_unpack(texelFetch(gbuf_specular, pixel, 0), texelFetch(gbuf_lobe, pixel, 0));
         float alpha = max(sqr(lobe.roughness), ALPHA_MIN);
-        bool has_lobe = max3(lobe.f0) > 0.0 || lobe.f90 > 0.0;
+        bool has_lobe = lobe_reflects(lobe);
         vec3 gain = has_lobe ? multiscatter_gain(brdf_energy, brdf_average, lobe, saturate(abs(dot(n, v)))) : vec3(0.0);
 #endif
         for (int i = 0; i < light_count; ++i) {
@@ -63,22 +61,10 @@ void main()
 #if HAS_SHADOW_CONES
             visible = texelFetch(shadow_cones, ivec3(pixel, i), 0).r;
 #else
-            if (light.views > 0) {
-                LightView v = light_views[light_view_of(light, position_ws)];
-#if HAS_SHADOW_DEPTH
-                if (v.map == MAP_SHADOW) {
-                    visible = light_visibility(shadow_depth, light, v, receiver_ws, receiver_ng, softness, turn);
-                }
-#endif
-#if HAS_RSM_DEPTH
-                if (v.map == MAP_BOUNCE) {
-                    visible = light_visibility(rsm_depth, light, v, receiver_ws, receiver_ng, softness, turn);
-                }
-#endif
-            }
+            visible = light_share(light, receiver_ws, receiver_ng, softness, turn);
 #endif
 #if HAS_MEDIUM
-            arriving *= medium_transmittance(position_ws, l, light_is_directional(light) ? 1e30 : length(light.position_ws - position_ws));
+            arriving *= medium_transmittance(position_ws, l, light_distance(light, position_ws));
 #endif
 #if HAS_SSDO_PLANES
             if (visible > 0.0) {

@@ -1,12 +1,13 @@
 // Indirect light of a pixel from the low-resolution gather, where that holds the pixel's surface (Dachsbacher and
-// Stamminger 2005, §4.3; paper §IV-B). Included after view_lib, math_lib, sequence_lib and gather_grid, where the
-// low-resolution G-buffer, `low_indirect` and `low_direction` are declared.
+// Stamminger 2005, §4.3; paper §IV-B). Included after view_lib, math_lib and sequence_lib, where the low-resolution
+// G-buffer, `low_indirect` and `low_direction` are declared.
 //
 // A neighbour counts if its triangle's plane is the pixel's within the blocks' own footprint and faces the same way
 // within 25°: relative to the picture, not to world units. Its irradiance is turned to the pixel's shading normal by the
 // linear irradiance model E(n) ∝ R0/4 + R1·n/2 (R. Ramamoorthi and P. Hanrahan, SIGGRAPH 2001, orders 0 and 1).
 
-const float SAME_FACING = 0.906; // cos 25°
+#include "passes/gather_receiver.glsl"
+
 // Share of the bilinear weight that must be on the pixel's surface: all of it but for rounding. With a neighbour missing, light
 // that falls off towards an edge would be taken from one side of the pixel only, and jump as the grid moves.
 const float ENOUGH = 0.99;
@@ -26,25 +27,15 @@ bool interpolated_indirect(vec3 position_ws, vec3 n, vec3 ng, float depth, out v
     for (int k = 0; k < 4; ++k) {
         ivec2 corner = ivec2(k & 1, k >> 1);
         ivec2 block = clamp(base + corner, ivec2(0), last);
-        float other_depth = texelFetch(low_depth, block, 0).r;
-        if (other_depth <= 0.0) {
-            continue;
-        }
-        vec4 other = texelFetch(low_normal, block, 0);
-        vec3 other_ng = octahedral_decode(other.zw);
-        if (dot(other_ng, ng) < SAME_FACING) {
-            continue;
-        }
-        ivec2 pixel = gather_grid_pixel(block, texelFetch(low_pixel, block, 0).rg);
-        vec3 other_ws = position_ws_from_depth((vec2(pixel) + 0.5) * view.inverse_resolution, other_depth);
+        Receiver other = gather_receiver(block);
         // Off the plane by less than half a block's width: the same surface, seen from here.
-        if (abs(dot(other_ws - position_ws, ng)) > 0.5 * scale * pixel_width(depth)) {
+        if (!on_surface(other, position_ws, ng, 0.5 * scale * pixel_width(depth))) {
             continue;
         }
         vec2 s = mix(1.0 - f, f, vec2(corner));
         float w = max(s.x * s.y, 1e-3);
         vec4 direction = texelFetch(low_direction, block, 0);
-        float from = linear_irradiance(direction, octahedral_decode(other.xy));
+        float from = linear_irradiance(direction, other.n);
         // Turning may dim to nothing, and brighten by the two-fold at most that 25° can make of an even sky.
         float turn = from > 0.0 ? min(linear_irradiance(direction, n) / from, 2.0) : 1.0;
         sum += w * turn * texelFetch(low_indirect, block, 0).rgb;

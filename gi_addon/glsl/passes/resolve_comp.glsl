@@ -175,9 +175,7 @@ void main()
     vec3 glossy_color = vec3(0.0);
 #if HAS_GBUF_SPECULAR && HAS_GBUF_LOBE && HAS_BRDF_ALBEDO
     if (surface) {
-        vec4 specular = texelFetch(gbuf_specular, pixel, 0);
-        vec4 packed_lobe = texelFetch(gbuf_lobe, pixel, 0);
-        Lobe lobe = Lobe(specular.rgb, packed_lobe.g, specular.a, packed_lobe.r, packed_lobe.b);
+        Lobe lobe = lobe_unpack(texelFetch(gbuf_specular, pixel, 0), texelFetch(gbuf_lobe, pixel, 0));
         vec3 n = octahedral_decode(texelFetch(gbuf_normal, pixel, 0).xy);
         float cos_v = saturate(abs(dot(n, view_direction_ws(uv))));
         glossy_color = lobe_albedo(brdf_albedo, brdf_average, brdf_energy, lobe, cos_v) * passes;

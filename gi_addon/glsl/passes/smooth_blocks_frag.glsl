@@ -1,36 +1,27 @@
 // The low-resolution gather, averaged over the 3 × 3 blocks that show the same surface: every block has its own directions,
 // and nine blocks' together are a ninth of the noise. The interpolation that follows takes as much for granted: that indirect
-// light is smooth over a few blocks of one surface (passes/interpolate.glsl, whose tests of that these are).
+// light is smooth over a few blocks of one surface (passes/interpolate.glsl, whose tests of that these are). It is over as far as
+// the surfaces lie that it comes from, by the mean of 1/distance (G. Ward et al., "A Ray Tracing Solution for Diffuse
+// Interreflection", SIGGRAPH 1988): not at a contact, nor across a wall. A gather that does not know says 0.
 
 #include "lib/view_lib.glsl"
 #include "lib/math_lib.glsl"
 #include "lib/sequence_lib.glsl"
-#include "passes/gather_grid.glsl"
+#include "passes/gather_receiver.glsl"
 
-const float SAME_FACING = 0.906; // cos 25°
 // A tent over three blocks.
 const float WEIGHT[2] = float[2](1.0, 0.5);
-
-vec3 block_position(ivec2 block, float depth)
-{
-    ivec2 pixel = gather_grid_pixel(block, texelFetch(low_pixel, block, 0).rg);
-    return position_ws_from_depth((vec2(pixel) + 0.5) * view.inverse_resolution, depth);
-}
-
-bool near_enough(ivec2 other, vec3 p, float d, float r) { return distance(block_position(other,d), p) <= min(r, texelFetch(raw_indirect, other, 0).a); }
 
 void main()
 {
     ivec2 block = ivec2(gl_FragCoord.xy);
     low_indirect = texelFetch(raw_indirect, block, 0);
     low_direction = texelFetch(raw_direction, block, 0);
-    float depth = texelFetch(low_depth, block, 0).r;
-    if (depth <= 0.0) {
+    Receiver here = gather_receiver(block);
+    if (!here.exists) {
         return;
     }
-    vec3 ng = octahedral_decode(texelFetch(low_normal, block, 0).zw);
-    vec3 position_ws = block_position(block, depth);
-    float off_plane = float(GATHER_SCALE) * pixel_width(depth);
+    float off_plane = float(GATHER_SCALE) * pixel_width(here.depth);
     ivec2 last = textureSize(low_depth, 0) - 1;
     vec4 light = vec4(0.0);
     vec4 direction = vec4(0.0);
@@ -43,9 +34,10 @@ void main()
                 w = 0.0;
             }
             other = clamp(other, ivec2(0), last);
-            float other_depth = texelFetch(low_depth, other, 0).r;
-            if (other_depth > 0.0 && w > 0.0 && dot(octahedral_decode(texelFetch(low_normal, other, 0).zw), ng) >= SAME_FACING &&
-                abs(dot(block_position(other, other_depth) - position_ws, ng)) <= off_plane && near_enough(other, position_ws, other_depth, low_indirect.a)) {
+            Receiver there = gather_receiver(other);
+            float nearness = max(low_indirect.a, texelFetch(raw_indirect, other, 0).a);
+            if (w > 0.0 && on_surface(there, here.position_ws, here.ng, off_plane) &&
+                distance(there.position_ws, here.position_ws) * nearness <= 1.0) {
                 light += w * texelFetch(raw_indirect, other, 0);
                 direction += w * texelFetch(raw_direction, other, 0);
                 weight += w;

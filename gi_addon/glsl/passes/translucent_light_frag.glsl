@@ -35,22 +35,9 @@ void main()
         if (cos_l <= 0.0 || dot(ng, l) <= 0.0 || max3(arriving) <= 0.0) {
             continue;
         }
-        float visible = 1.0;
-        if (light.views > 0) {
-            LightView v = light_views[light_view_of(light, position_ws)];
-#if HAS_SHADOW_DEPTH
-            if (v.map == MAP_SHADOW) {
-                visible = light_visibility(shadow_depth, light, v, position_ws, ng, softness, turn);
-            }
-#endif
-#if HAS_RSM_DEPTH
-            if (v.map == MAP_BOUNCE) {
-                visible = light_visibility(rsm_depth, light, v, position_ws, ng, softness, turn);
-            }
-#endif
-        }
+        float visible = light_share(light, position_ws, ng, softness, turn);
 #if HAS_MEDIUM
-        arriving *= medium_transmittance(position_ws, l, light_is_directional(light) ? 1e30 : length(light.position_ws - position_ws));
+        arriving *= medium_transmittance(position_ws, l, light_distance(light, position_ws));
 #endif
         irradiance += light.diffuse * arriving * (cos_l * visible);
     }

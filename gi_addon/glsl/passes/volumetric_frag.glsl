@@ -10,6 +10,9 @@
 #if HAS_LIGHTS && HAS_VOLUME_LIGHT
 #include "lib/light_lib.glsl"
 #include "lib/math_lib.glsl"
+#if HAS_LIGHT_VIEWS
+#include "lib/shadow_lib.glsl"
+#endif
 
 #if RADIAL_BLUR
 #include "engines/ssdo/radial_lib.glsl"
@@ -19,43 +22,13 @@
 #include "engines/vct/air_lib.glsl"
 #endif
 
-// Whether light gets to a point of the air: its texel's depth alone, the sub-frames blur it.
+// Whether light gets to a point of the air.
 float air_visibility(Light light, vec3 position_ws)
 {
 #if VOXEL_VISIBILITY
     return voxel_visibility(light, position_ws);
 #elif HAS_LIGHT_VIEWS
-    if (light.views <= 0) {
-        return 1.0;
-    }
-    int best = light.first_view;
-    float deepest = -1e30;
-    for (int i = 0; i < light.views; ++i) {
-        float d = dot(position_ws - light_views[light.first_view + i].origin_ws, light_views[light.first_view + i].axis_z);
-        if (d > deepest) {
-            deepest = d;
-            best = light.first_view + i;
-        }
-    }
-    LightView v = light_views[best];
-    vec3 p = light_view_project(v, position_ws);
-    vec2 unit = p.xy / v.guard;
-    if (any(greaterThan(abs(unit), vec2(1.0))) || p.z <= v.near) {
-        return 1.0;
-    }
-    ivec2 texel = ivec2(v.rect.xy + (unit * 0.5 + 0.5) * v.rect.zw);
-    float d = 0.0;
-#if HAS_SHADOW_DEPTH
-    if (v.map == MAP_SHADOW) {
-        d = texelFetch(shadow_depth, texel, 0).r;
-    }
-#endif
-#if HAS_RSM_DEPTH
-    if (v.map == MAP_BOUNCE) {
-        d = texelFetch(rsm_depth, texel, 0).r;
-    }
-#endif
-    return d == 0.0 || d >= p.z ? 1.0 : 0.0;
+    return air_share(light, position_ws);
 #else
     return 1.0;
 #endif
@@ -136,8 +109,7 @@ vec3 scattered(Light light, vec3 origin_ws, vec3 direction, vec2 span, float off
         float angle;
         vec3 arriving = light_arriving(light, p, l, angle);
         if (max3(arriving) > 0.0) {
-            float reach = parallel ? 1e30 : length(light.position_ws - p);
-            vec3 left = medium_transmittance(p, l, reach) * exp(-medium_extinction * (t - max(span.x, 0.0)));
+            vec3 left = medium_transmittance(p, l, light_distance(light, p)) * exp(-medium_extinction * (t - max(span.x, 0.0)));
             // The span begins where the light's part of the ray does, not where the medium does.
             sum += arriving * left * (weight * air_visibility(light, p) *
                                       henyey_greenstein(dot(l, direction), medium_anisotropy));

@@ -19,10 +19,8 @@ void main()
     if (depth <= 0.0) {
         return;
     }
-    vec4 specular = texelFetch(gbuf_specular, pixel, 0);
-    vec4 packed_lobe = texelFetch(gbuf_lobe, pixel, 0);
-    Lobe lobe = Lobe(specular.rgb, packed_lobe.g, specular.a, packed_lobe.r, packed_lobe.b);
-    if (max3(lobe.f0) <= 0.0 && lobe.f90 <= 0.0) {
+    Lobe lobe = lobe_unpack(texelFetch(gbuf_specular, pixel, 0), texelFetch(gbuf_lobe, pixel, 0));
+    if (!lobe_reflects(lobe)) {
         return;
     }
     vec3 position_ws = position_ws_from_depth(uv, depth);
@@ -37,7 +35,7 @@ void main()
     vec3 from = (position_ws - grid_origin) / grid_cell + ng * half_cell_shift(ng);
     // Each pixel turns the sequence by its own number (R. Cranley and T. Patterson, 1976).
     uint seed = hash_u32(uvec2(pixel + view.pixel_offset));
-    vec2 turn = vec2(unit_float(seed), unit_float(hash_u32(seed)));
+    vec2 turn = unit_shift(seed);
     vec3 sum = vec3(0.0);
     for (int i = 0; i < glossy_rays; ++i) {
         vec2 u = fract(sobol_2d(view.subframe * uint(glossy_rays) + uint(i), 40u) + turn);
@@ -47,8 +45,7 @@ void main()
         if (l_local.z <= 0.0 || dot(l, ng) <= 0.0) {
             continue;
         }
-        float lambda_v = ggx_lambda(v_local.z, alpha);
-        float g2_g1 = (1.0 + lambda_v) / (1.0 + lambda_v + ggx_lambda(l_local.z, alpha));
+        float g2_g1 = ggx_visible_weight(v_local.z, l_local.z, alpha);
         sum += fresnel(lobe, saturate(dot(v_local, h))) * g2_g1 * march_walls(from, l, 1e9).radiance;
     }
     vec3 gain = multiscatter_gain(brdf_energy, brdf_average, lobe, saturate(abs(dot(n, v))));

@@ -12,10 +12,8 @@ void main()
     vec2 uv = gl_FragCoord.xy * view.inverse_resolution;
     float depth = texelFetch(gbuf_depth, pixel, 0).r;
     indirect_glossy = vec4(0.0, 0.0, 0.0, 1.0);
-    vec4 specular = texelFetch(gbuf_specular, pixel, 0);
-    vec4 packed_lobe = texelFetch(gbuf_lobe, pixel, 0);
-    Lobe lobe = Lobe(specular.rgb, packed_lobe.g, specular.a, packed_lobe.r, packed_lobe.b);
-    if (depth <= 0.0 || (max3(lobe.f0) <= 0.0 && lobe.f90 <= 0.0)) {
+    Lobe lobe = lobe_unpack(texelFetch(gbuf_specular, pixel, 0), texelFetch(gbuf_lobe, pixel, 0));
+    if (depth <= 0.0 || !lobe_reflects(lobe)) {
         return;
     }
     vec3 position_ws = position_ws_from_depth(uv, depth);
@@ -28,15 +26,14 @@ void main()
     float alpha = max(sqr(lobe.roughness), ALPHA_MIN);
     // Every pixel's points are the sequence's, turned by its own offset (R. Cranley and T. Patterson, 1976).
     uint seed = hash_u32(uvec2(pixel + view.pixel_offset));
-    vec2 u = fract(sobol_2d(view.subframe, 40u) + vec2(unit_float(seed), unit_float(hash_u32(seed))));
+    vec2 u = fract(sobol_2d(view.subframe, 40u) + unit_shift(seed));
     vec3 h = ggx_sample_visible_normal(v, alpha, u);
     vec3 l = reflect(-v, h);
     vec3 direction = frame * l;
     if (l.z <= 0.0 || dot(direction, ng) <= 0.0) {
         return;
     }
-    float lambda_v = ggx_lambda(v.z, alpha);
-    vec3 share = fresnel(lobe, saturate(dot(v, h))) * ((1.0 + lambda_v) / (1.0 + lambda_v + ggx_lambda(l.z, alpha)));
+    vec3 share = fresnel(lobe, saturate(dot(v, h))) * ggx_visible_weight(v.z, l.z, alpha);
     share *= multiscatter_gain(brdf_energy, brdf_average, lobe, v.z);
     bool hit;
     float distance;

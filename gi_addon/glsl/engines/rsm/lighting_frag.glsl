@@ -4,7 +4,6 @@
 #include "lib/view_lib.glsl"
 #include "lib/sequence_lib.glsl"
 #include "engines/rsm/gather_lib.glsl"
-#include "passes/gather_grid.glsl"
 #if HAS_LOW_INDIRECT
 #include "passes/interpolate.glsl"
 #endif

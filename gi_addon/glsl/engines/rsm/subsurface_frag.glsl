@@ -62,7 +62,7 @@ void main()
     // A channel that does not scatter is as sharp as the map.
     vec3 d = max(medium.rgb / s, vec3(1e-3 * max3(medium.rgb)));
     uint seed = hash_u32(uvec2(pixel + view.pixel_offset));
-    vec2 turn = vec2(unit_float(seed), unit_float(hash_u32(seed)));
+    vec2 turn = unit_shift(seed);
     vec3 exitance = vec3(0.0);
     for (int i = 0; i < rsm_light_count; ++i) {
         Light light = rsm_lights[i];
@@ -89,7 +89,7 @@ void main()
             vec3 beam = light_arriving(light, q, towards, angle) * saturate(dot(towards, l));
             if (entry_point(light, q, y)) {
 #if HAS_MEDIUM
-                beam *= medium_transmittance(y, towards, light_is_directional(light) ? 1e30 : length(light.position_ws - y));
+                beam *= medium_transmittance(y, towards, light_distance(light, y));
 #endif
                 exitance += beam * profile(distance(y, position_ws), d) / dot(profile(radius, d), vec3(1.0 / 3.0));
             }

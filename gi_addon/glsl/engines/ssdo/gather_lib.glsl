@@ -48,7 +48,7 @@ Gathered gather_screen(vec3 position_ws, vec3 n, vec3 ng, vec3 v, uint seed)
 {
     Gathered g = Gathered(vec3(0.0), vec4(0.0));
     float reach = ssdo_radius > 0.0 ? ssdo_radius : 2.0 * view.scene_radius;
-    vec2 turn = vec2(unit_float(seed), unit_float(hash_u32(seed)));
+    vec2 turn = unit_shift(seed);
     vec3 origin = screen_from_ws(position_ws);
     vec2 jitters = sobol_2d(view.subframe, 41u);
 #if SSDO_RAYS

@@ -1,22 +1,17 @@
 // Light from the screen at each block's representative pixel.
 
 #include "engines/ssdo/gather_lib.glsl"
-#include "passes/gather_grid.glsl"
+#include "passes/gather_receiver.glsl"
 
 void main()
 {
-    ivec2 block = ivec2(gl_FragCoord.xy);
-    float depth = texelFetch(low_depth, block, 0).r;
+    Receiver r = gather_receiver(ivec2(gl_FragCoord.xy));
     raw_indirect = vec4(0.0);
     raw_direction = vec4(0.0);
-    if (depth <= 0.0) {
-        return;
+    if (r.exists) {
+        vec2 uv = (vec2(r.pixel) + 0.5) * view.inverse_resolution;
+        Gathered g = gather_screen(r.position_ws, r.n, r.ng, view_direction_ws(uv), hash_u32(uvec2(r.pixel + view.pixel_offset)));
+        raw_indirect = vec4(g.radiance, 0.0);
+        raw_direction = g.direction;
     }
-    ivec2 pixel = gather_grid_pixel(block, texelFetch(low_pixel, block, 0).rg);
-    vec2 uv = (vec2(pixel) + 0.5) * view.inverse_resolution;
-    vec4 normals = texelFetch(low_normal, block, 0);
-    Gathered g = gather_screen(position_ws_from_depth(uv, depth), octahedral_decode(normals.xy), octahedral_decode(normals.zw),
-                               view_direction_ws(uv), hash_u32(uvec2(pixel + view.pixel_offset)));
-    raw_indirect = vec4(g.radiance, 1.0);
-    raw_direction = g.direction;
 }

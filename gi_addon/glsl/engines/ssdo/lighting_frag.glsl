@@ -2,7 +2,6 @@
 // where it does not.
 
 #include "engines/ssdo/gather_lib.glsl"
-#include "passes/gather_grid.glsl"
 #if HAS_LOW_INDIRECT
 #include "passes/interpolate.glsl"
 #endif

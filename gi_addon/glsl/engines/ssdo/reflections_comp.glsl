@@ -29,10 +29,8 @@ void main()
     vec3 indirect = vec3(0.0);
     vec3 sources = vec3(0.0);
     float depth = texelFetch(gbuf_depth, pixel, 0).r;
-    vec4 specular = texelFetch(gbuf_specular, pixel, 0);
-    vec4 packed_lobe = texelFetch(gbuf_lobe, pixel, 0);
-    Lobe lobe = Lobe(specular.rgb, packed_lobe.g, specular.a, packed_lobe.r, packed_lobe.b);
-    if (depth > 0.0 && (max3(lobe.f0) > 0.0 || lobe.f90 > 0.0)) {
+    Lobe lobe = lobe_unpack(texelFetch(gbuf_specular, pixel, 0), texelFetch(gbuf_lobe, pixel, 0));
+    if (depth > 0.0 && lobe_reflects(lobe)) {
         vec4 normals = texelFetch(gbuf_normal, pixel, 0);
         vec3 n = octahedral_decode(normals.xy);
         vec3 ng = octahedral_decode(normals.zw);
@@ -42,13 +40,12 @@ void main()
         local_v.z = max(local_v.z, 1e-4);
         float alpha = max(sqr(lobe.roughness), ALPHA_MIN);
         uint seed = hash_u32(uvec2(pixel + view.pixel_offset));
-        vec2 u = fract(sobol_2d(view.subframe, 42u) + vec2(unit_float(seed), unit_float(hash_u32(seed))));
+        vec2 u = fract(sobol_2d(view.subframe, 42u) + unit_shift(seed));
         vec3 h = ggx_sample_visible_normal(normalize(local_v), alpha, u);
         vec3 local_l = reflect(-normalize(local_v), h);
         vec3 l = frame * local_l;
         if (local_l.z > 0.0 && dot(l, ng) > 0.0) {
-            float lambda_v = ggx_lambda(local_v.z, alpha);
-            float g = (1.0 + lambda_v) / (1.0 + lambda_v + ggx_lambda(local_l.z, alpha));
+            float g = ggx_visible_weight(local_v.z, local_l.z, alpha);
             vec3 weight = fresnel(lobe, saturate(dot(normalize(local_v), h))) * g *
                           multiscatter_gain(brdf_energy, brdf_average, lobe, saturate(local_v.z));
             Traced hit = trace(position_ws_from_depth(uv, depth), l, 2.0 * view.scene_radius, ssdo_thickness);

@@ -16,10 +16,8 @@ void main()
 #endif
     vec3 albedo = texelFetch(gbuf_diffuse, pixel, 0).rgb;
 #if HAS_GBUF_SPECULAR && HAS_GBUF_LOBE && HAS_BRDF_AVERAGE && HAS_BRDF_ENERGY
-    vec4 specular = texelFetch(gbuf_specular, pixel, 0);
-    vec4 packed_lobe = texelFetch(gbuf_lobe, pixel, 0);
-    Lobe lobe = Lobe(specular.rgb, packed_lobe.g, specular.a, packed_lobe.r, packed_lobe.b);
-    if (max3(lobe.f0) > 0.0 || lobe.f90 > 0.0) {
+    Lobe lobe = lobe_unpack(texelFetch(gbuf_specular, pixel, 0), texelFetch(gbuf_lobe, pixel, 0));
+    if (lobe_reflects(lobe)) {
         albedo += lobe_albedo_average(brdf_average, brdf_energy, lobe);
     }
 #endif

@@ -9,7 +9,7 @@ float screen_visibility(Light light, vec3 position_ws, vec3 l, float jitter)
     if ((light.flags & LIGHT_FLAG_SHADOW) == 0) {
         return 1.0;
     }
-    float reach = light_is_directional(light) ? 1e30 : length(light.position_ws - position_ws);
+    float reach = light_distance(light, position_ws);
     reach = min(reach, ssdo_shadow_reach);
     return march(position_ws, l, reach, ssdo_shadow_steps, ssdo_thickness, jitter).found ? 0.0 : 1.0;
 }

@@ -35,7 +35,7 @@ void main()
         vec3 d = max(medium.rgb / (1.9 - albedo + 3.5 * (albedo - 0.8) * (albedo - 0.8)), vec3(1e-3 * max3(medium.rgb)));
         mat3 frame = frame_from_normal(ng);
         uint seed = hash_u32(uvec2(pixel + view.pixel_offset));
-        vec2 turn = vec2(unit_float(seed), unit_float(hash_u32(seed)));
+        vec2 turn = unit_shift(seed);
         for (int k = 0; k < TAPS; ++k) {
             vec2 u = fract(sobol_2d(view.subframe * uint(TAPS) + uint(k), 45u) + turn);
             // One number chooses the channel, then the exponential (a fourth of the profile is the narrow one), then r.

@@ -12,7 +12,7 @@ Grid voxel_grid() { return Grid(grid_low, grid_cell, vec3(grid_size), grid_level
 struct Gathered {
     vec3 radiance;    // E/π, W/(m²·sr)
     vec4 direction;   // Σ luminance × direction; Σ luminance, per direction
-    float distance_;  // harmonic mean of how far the surfaces are that it comes from, m
+    float nearness;   // mean of 1/distance of the surfaces that it comes from, 1/m
 };
 
 // The cone that leaves a surface at `position_ws` along `direction`, `reach` m far.
@@ -49,10 +49,10 @@ Gathered gather_cones(vec3 position_ws, vec3 n, vec3 ng)
         }
         ConeResult result = trace_cone(voxel_radiance, voxel_back, voxel_sheets, voxel_kinds, grid, cone);
         g.radiance += result.radiance;
-        g.distance_ += 1.0 / max(result.first.t, LIFT);
+        g.nearness += 1.0 / max(result.first.t, LIFT);
         g.direction += vec4(cone.direction, 1.0) * (luminance(result.radiance) / max(local.z, spread));
     }
     g.radiance /= float(cone_count);
-    g.distance_ = grid.cell * float(cone_count) / max(g.distance_, 1e-20);
+    g.nearness /= float(cone_count) * grid.cell;
     return g;
 }

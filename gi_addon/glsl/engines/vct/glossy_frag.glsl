@@ -16,10 +16,8 @@ void main()
     vec2 uv = gl_FragCoord.xy * view.inverse_resolution;
     float depth = texelFetch(gbuf_depth, pixel, 0).r;
     indirect_glossy = vec4(0.0);
-    vec4 specular = texelFetch(gbuf_specular, pixel, 0);
-    vec4 packed_lobe = texelFetch(gbuf_lobe, pixel, 0);
-    Lobe lobe = Lobe(specular.rgb, packed_lobe.g, specular.a, packed_lobe.r, packed_lobe.b);
-    if (depth <= 0.0 || (max3(lobe.f0) <= 0.0 && lobe.f90 <= 0.0)) {
+    Lobe lobe = lobe_unpack(texelFetch(gbuf_specular, pixel, 0), texelFetch(gbuf_lobe, pixel, 0));
+    if (depth <= 0.0 || !lobe_reflects(lobe)) {
         return;
     }
     vec3 position_ws = position_ws_from_depth(uv, depth);
@@ -41,8 +39,7 @@ void main()
     float spread = min(2.0 * sqrt(2.0 / cone_sets) * alpha, 1.0);
     Cone cone = surface_cone(voxel_grid(), position_ws, ng, l, spread, 1e30);
     ConeResult result = trace_seen(voxel_grid(), cone);
-    float lambda_v = ggx_lambda(v_local.z, alpha);
-    float shadowing = (1.0 + lambda_v) / (1.0 + lambda_v + ggx_lambda(l_local.z, alpha));
+    float shadowing = ggx_visible_weight(v_local.z, l_local.z, alpha);
     vec3 gain = multiscatter_gain(brdf_energy, brdf_average, lobe, v_local.z);
     indirect_glossy = vec4(result.radiance * fresnel(lobe, saturate(dot(v_local, h))) * gain * shadowing, 1.0);
 }
