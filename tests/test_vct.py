@@ -8,6 +8,7 @@ import pytest
 from conftest import make
 
 from gi_addon.compare import scenes
+from gi_addon.compare.closed_forms import polygon_form_factor
 from gi_addon.gl import GL, shared
 from gi_addon.outputs import OUTPUTS
 from gi_addon.passes.voxels import VoxelGrid, voxel_grid
@@ -210,6 +211,36 @@ def test_empty_cells_hold_nothing(gl):
         for z in range(3):
             middle = atlas[m - 1 + z * 2 * m : m + 1 + z * 2 * m, m - 1 : m + 1]
             assert (middle[:, :, m - 1 : m + 1] == 0).all() and (middle[:, :, 3 * m - 1 : 3 * m + 1] == 0).all()
+
+
+@pytest.mark.parametrize(("cells", "up", "within"), [(1.0, True, 0.06), (1.0, False, 0.06), (2.0, True, 0.06), (0.5, False, 0.3)])
+def test_a_lamp_close_to_a_floor_lights_it_and_hides_what_is_below(gl, cells, up, within):
+    """An emissive square a cell or two above a floor, whichever way it faces: what a ceiling receives from the floor around it is
+    ∫ ρ L F(x → lamp) cosθ cosθ'/(π d²) dA over what the lamp leaves visible, ± 6 %; nearer than a cell, where lamp and floor
+    share cells, ± 30 %."""
+    h = cells * 4.0 / 63.0
+    lamp = np.array([[-0.25, -0.25, h], [0.25, -0.25, h], [0.25, 0.25, h], [-0.25, 0.25, h]])
+    b = scenes.SceneBuilder()
+    b.quads(np.array([[[-2.0, -2, 0], [2, -2, 0], [2, 2, 0], [-2, 2, 0]]]), scenes.diffuse((0.8,) * 3))
+    b.quads((lamp if up else lamp[::-1])[None], scenes.emissive((1, 1, 1), 10.0))
+    b.quads(np.array([[[-0.5, -0.5, 1.5], [-0.5, 0.5, 1.5], [0.5, 0.5, 1.5], [0.5, -0.5, 1.5]]]), scenes.diffuse((0.5,) * 3))
+    scene = b.build(scenes.perspective((0, 0, 0.9), (0, 0.001, 1.5), 0.9))
+    image = vct(scene, "Diffuse Indirect", samples=16, resolution=(32, 18)).passes["Diffuse Indirect"]
+    edge = np.sinh(np.linspace(-3.0, 3.0, 161))
+    edge *= 2.0 / edge[-1]
+    middle, width = (edge[1:] + edge[:-1]) / 2, np.diff(edge)
+    x, y = np.meshgrid(middle, middle)
+    floor = np.stack([x, y, 0 * x], -1).reshape(-1, 3)
+    radiosity = 0.8 * np.pi * 10.0 * polygon_form_factor(floor, np.broadcast_to([0.0, 0, 1], floor.shape), lamp)
+    flux = radiosity * np.outer(width, width).ravel()
+    exact = []
+    for px, py in ((px, py) for px in np.linspace(-0.2, 0.2, 3) for py in np.linspace(-0.12, 0.12, 3)):
+        to = np.array([px, py, 1.5]) - floor
+        d2 = (to * to).sum(-1)
+        over = floor[:, :2] * (1 - h / 1.5) + np.array([px, py]) * (h / 1.5)
+        seen = (np.abs(over) >= 0.25).any(-1)
+        exact.append((flux * seen * to[:, 2] ** 2 / d2**2).sum() / np.pi**2)
+    assert image.mean() == pytest.approx(np.mean(exact), rel=within)
 
 
 # --- the rest of the stability suite --------------------------------------------------------------------------------------

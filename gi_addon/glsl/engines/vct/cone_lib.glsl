@@ -128,11 +128,14 @@ Meeting first_sheet(sampler3D sheets, Cone cone, ivec3 cell, ivec3 size, uint ki
     return first;
 }
 
-// Light that leaves a sheet towards the cone, over the cone's footprint there.
+// Light that leaves a sheet towards the cone, over the cone's footprint there: filtered across the sheet, but not along its axis,
+// where other surfaces face the same way before and behind it.
 vec3 leaving_light(sampler3D atlas, sampler3D back, Grid grid, Cone cone, Meeting met)
 {
-    vec3 uvw = (cone.start + cone.direction * met.t) / grid.size;
-    float lod = clamp(log2(max(cone.spread * met.t, 1.0)), 0.0, grid.levels);
+    float lod = clamp(floor(log2(max(cone.spread * met.t, 1.0))), 0.0, grid.levels);
+    vec3 p = cone.start + cone.direction * met.t;
+    vec3 layer = (floor(vec3(met.cell) * exp2(-lod)) + 0.5) * exp2(lod);
+    vec3 uvw = mix(p, layer, equal(ivec3(met.part >> 1), ivec3(0, 1, 2))) / grid.size;
     vec4 light = met.front ? part_at(atlas, grid, uvw, lod, met.part) : textureLod(back, uvw, lod);
     return light.a > 0.0 ? light.rgb / light.a : vec3(0.0);
 }

@@ -61,10 +61,10 @@ float squares_share(uint squares) { return float(bitCount(squares)) / 16.0; }
 // Kinds of sheets in a cell: 1 … 63 a bit each, or 64 + level of the largest empty block.
 uint kinds_of(vec4 texel) { return uint(texel.r * 255.0 + 0.5); }
 
-// One part at `uvw` in [0, 1]³ of the grid, filtered. Half a texel of the coarser level stays between neighbouring parts.
+// One part at `uvw` in [0, 1]³ of the grid, filtered within level `lod`. Half a texel stays between neighbouring parts.
 vec4 part_at(sampler3D atlas, Grid grid, vec3 uvw, float lod, int part)
 {
-    vec3 margin = 0.5 * exp2(ceil(lod)) / grid.size;
+    vec3 margin = 0.5 * exp2(lod) / grid.size;
     uvw = clamp(uvw, margin, 1.0 - margin);
     return textureLod(atlas, vec3((uvw.x + float(part & 1)) / 2.0, uvw.y, (uvw.z + float(part >> 1)) / 3.0), lod);
 }
