@@ -161,7 +161,7 @@ Meeting next_sheet(sampler3D sheets, sampler3D kinds, Grid grid, Cone cone, floa
         float t_out = t + max(min(out_at.x, min(out_at.y, out_at.z)), 0.0);
         if (found < 64u) {
             met = first_sheet(sheets, cone, cell, size, found, t, min(t_out, end));
-            met.opacity = texel.g;
+            met.opacity = met.t < end ? texel.g : 0.0;
         }
         t = t_out + 1e-3;
     }
