@@ -175,9 +175,12 @@ def report_command(
         raise click.UsageError("a snapshot has no Cycles reference: give the scene file itself")
     candidates = [c for t in names for c in technique_sweep(t, sweep)] + [c for p in rivals for c in peer_sweep(p, sweep)]
     size = options["resolution"] or (128, 72)
-    measured = []
+    measured: list[report.Measured] = []
     calibration = shared().call(bench.calibrate)
     console.print(bench.hardware_text(calibration), highlight=False)
+    frames = shared().call(bench.frames_asked)
+    head = {"version": study.source_version(), "driver": driver(), "date": datetime.date.today().isoformat(), "sweep": sweep}
+    head["calibration"] = bench.hardware_text(calibration)
     for scene in scenes:
         arguments = (None, options["samples"], size, options["frame"], options["assignments"])
         with _blender(scene, *arguments) as bscene:
@@ -225,7 +228,7 @@ def report_command(
                     peer=run_peer,
                     peer_versions=versions,
                     visits=visits,
-                    repeats=3 if visits > 1 else 5,
+                    repeats=-(-frames // visits),
                     budget_s=budget,
                     progress=lambda text, label=label: console.print(f"{label}: {text}", style="dim", highlight=False),
                 )
@@ -233,8 +236,9 @@ def report_command(
         record = study.scene_record(label, key, size, samples, runs, references, plain.triangle_count())
         record["peers"] = {m: v for m, v in versions.items() if any(r.candidate.method == m for r in runs)}
         measured.append(report.Measured(record, runs, references))
-    head = {"version": study.source_version(), "driver": driver(), "date": datetime.date.today().isoformat(), "sweep": sweep}
-    head["calibration"] = bench.hardware_text(calibration)
+        if scene != scenes[-1]:  # what is measured can be looked at while the others are
+            study.write_results(output, head, [m.record for m in measured])
+            report.write(output, head, measured, images=False)
     extra = ""
     if effects:
         from .compare import effects as table_1

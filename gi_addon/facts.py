@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from .focus import Focus, find_focus
 from .lights import Emitters, LightRig, build_rig
 from .materials import CompiledGraph, Medium, mean_medium
 from .outputs import film_layers
@@ -40,7 +41,8 @@ class Facts:
     world_black: bool
     ao_distance: float
     world_visible: bool = True  # to the camera
-    medium: Medium | None = None  # that fills the world
+    medium: Medium | None = None  # that fills the world, or the box
+    medium_box: np.ndarray | None = None  # (2, 3) world space, m; None: everywhere
     margin: int = 0  # px drawn beyond each side of the picture
     stamps: dict[str, str] = field(default_factory=dict)
     emitters: Emitters = field(default_factory=Emitters.none)  # all of them, sampled as lights or not
@@ -89,10 +91,11 @@ def gather_facts(
     subframes: int,
     world: WorldMap | None,
     emitters: Emitters,
+    focus: Focus | None = None,
 ) -> Facts:
-    """Look at everything once. ``resolution`` is the picture's."""
+    """Look at everything once. ``resolution`` is the picture's; ``focus`` is found where it is not given."""
     margin = round(settings.ssdo.margin * max(resolution)) if settings.technique == "SSDO" else 0
-    bounds = scene.bounds()
+    focus = focus or find_focus(scene)
     s = settings
     seen = scene.instances.visibility & CAMERA if len(scene.instances) else np.zeros(0, "u4")
     used = {m for i, ms in enumerate(scene.instances.materials) if seen[i] for m in ms}
@@ -102,7 +105,7 @@ def gather_facts(
     bounced = bounced or (s.use_translucency and any(c.transmissive or c.subsurface for c in some))
     from_screen = s.technique == "SSDO" and s.ssdo.sources == "SCREEN"
     rig = build_rig(
-        scene.lights, bounds,
+        scene.lights, focus,
         world=None if from_screen else world, world_samples=s.world.samples,
         emitters=Emitters.none() if from_screen or voxels_shine(s) else emitters, emitter_samples=_EMITTER_SAMPLES,
         area_lights=s.use_area_lights,
@@ -111,6 +114,13 @@ def gather_facts(
         shadow_resolution=s.shadows.resolution, bounce_resolution=s.rsm.resolution,
         world_resolution=s.world.resolution,
     )  # fmt: skip
+    medium, medium_box = mean_medium(scene.world.graph, scene.images), None
+    domains = _domains(scene)
+    if medium is None and domains:
+        medium, medium_box = domains[0]
+    ignored = len(domains) - (medium_box is not None)
+    if ignored:
+        rig.notes.append(f"{ignored} of {len(domains)} volume objects are left out: one medium can fill the scene")
     return Facts(
         settings=s,
         resolution=(resolution[0] + 2 * margin, resolution[1] + 2 * margin),
@@ -118,7 +128,7 @@ def gather_facts(
         outputs=outputs,
         subframes=subframes,
         rig=rig,
-        radius=float(np.linalg.norm(bounds[1] - bounds[0]) / 2.0) or 1.0,
+        radius=float(np.linalg.norm(focus.region[1] - focus.region[0]) / 2.0) or 1.0,
         triangles=scene.triangle_count(),
         visible=bool(seen.any()) and scene.triangle_count() > 0,
         emissive=any(c.emissive for c in some),
@@ -131,7 +141,25 @@ def gather_facts(
         world_black=world is None or world.black,
         ao_distance=s.ao.distance or scene.world.ao_distance,
         world_visible=scene.world.visible_camera,
-        medium=mean_medium(scene.world.graph, scene.images),
+        medium=medium,
+        medium_box=medium_box,
         stamps=scene.stamps(),
         emitters=emitters,
     )
+
+
+def _domains(scene: Scene) -> list[tuple[Medium, np.ndarray]]:
+    """(medium, box in world space) of the objects that are a volume and nothing else, the largest first. A domain counts as
+    the box around it, which a cube along the axes is."""
+    found = []
+    inst = scene.instances
+    media = [mean_medium(m.graph, scene.images) if m.graph.surface is None else None for m in scene.materials]
+    for i in range(len(inst)):
+        medium = next((media[m] for m in inst.materials[i] if media[m] is not None), None)
+        if medium is None or scene.meshes[inst.mesh[i]].empty or not np.isfinite(inst.matrix[i]).all():
+            continue
+        low, high = scene.meshes[inst.mesh[i]].bounds
+        corners = np.array([[(low, high)[k >> axis & 1][axis] for axis in range(3)] for k in range(8)])
+        corners = corners @ inst.matrix[i, :3, :3].T + inst.matrix[i, :3, 3]
+        found.append((medium, np.stack([corners.min(axis=0), corners.max(axis=0)])))
+    return sorted(found, key=lambda d: -float(np.prod(d[1][1] - d[1][0])))

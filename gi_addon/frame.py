@@ -114,6 +114,7 @@ class Frame:
         self._samples: dict[bool, Sample] = {}
         self.view = np.zeros((), VIEW)
         self.film_transparent = False
+        self.world_origin = np.zeros(3)  # what world coordinates on the GPU leave out
 
     # -- sub-frames ----------------------------------------------------------------------------------------------
 
@@ -126,6 +127,7 @@ class Frame:
         self.view = view_uniforms(camera, self.region, self.full, jitter, subframe, self.facts)
         self.view["margin"] = self.facts.margin
         self.view["film_transparent"] = float(self.film_transparent)
+        self.view["world_origin"] = self.world_origin
         self._view_buffer.write(self.view.tobytes())
         self._view_buffer.bind_to_uniform_block(0)
 

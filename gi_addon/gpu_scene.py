@@ -53,13 +53,17 @@ class DrawList:
     half: np.ndarray
     buffer: moderngl.Buffer
 
-    def visible(self, clip_from_world: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def visible(self, clip_from_world: np.ndarray, beyond: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
         """The commands whose boxes touch the view volume of ``clip_from_world`` (column-major as for GLSL), and how
-        many of them each batch has."""
+        many of them each batch has. What lies wholly in the box ``beyond`` (2, 3) is left out."""
         m = clip_from_world.reshape(4, 4).T.astype("f8")
         planes = np.concatenate([m[3] + m[:3], m[3] - m[:3]])
         distance = self.center @ planes[:, :3].T + planes[:, 3] + self.half @ np.abs(planes[:, :3]).T
         seen = (distance >= 0.0).all(axis=1)
+        if beyond is not None:
+            middle, reach = beyond.mean(axis=0), (beyond[1] - beyond[0]) / 2.0
+            # Boxes that make up ``beyond`` touch its sides, by rounding from without.
+            seen &= (np.abs(self.center - middle) + self.half > reach + 1e-6 * (reach.max() + np.abs(middle).max())).any(axis=1)
         return self.commands[seen], np.bincount(self.batch[seen], minlength=len(self.materials))
 
 
@@ -108,7 +112,7 @@ class GPUScene:
             self.compiled = self.materials.compile(scene.materials, scene.images)
             self._upload_params()
             self._material_key = material_key
-            self._vaos.clear()
+            self._drop_vaos()
             self._drop_draws()
             self.uploads["materials"] = len(self.compiled)
         if self._world_key != scene.world.uid:
@@ -138,7 +142,7 @@ class GPUScene:
                 old.write(np.ascontiguousarray(data))
             return old
         self.gl.release(old)
-        self._vaos.clear()
+        self._drop_vaos()
         self._buffers[name] = self.gl.buffer(f"scene {name}", np.ascontiguousarray(data))
         return self._buffers[name]
 
@@ -181,7 +185,7 @@ class GPUScene:
                     if part.shape[1] < width == 4:
                         data[start : start + len(part), 3] = 1.0
             self._streams[name] = self._buffer(f"attribute {name}", data)
-        self._vaos.clear()
+        self._drop_vaos()
         self._build_groups(scene)
 
     def _build_groups(self, scene: Scene) -> None:
@@ -202,6 +206,11 @@ class GPUScene:
     def _drop_draws(self) -> None:
         self.gl.release(*(draws.buffer for draws in self._draws.values()))
         self._draws.clear()
+
+    def _drop_vaos(self) -> None:
+        # Released by hand: moderngl leaves what Python forgets to the driver for as long as the context lives.
+        self.gl.release(*self._vaos.values())
+        self._vaos.clear()
 
     def _upload_instances(self, scene: Scene) -> None:
         inst = scene.instances
@@ -256,15 +265,18 @@ class GPUScene:
         """What was synced last."""
         return self._scene
 
-    def draw(self, planned: Planned, stages, visibility: int, clip_from_world: np.ndarray, **options) -> None:
+    def draw(
+        self, planned: Planned, stages, visibility: int, clip_from_world: np.ndarray, *, beyond: np.ndarray | None = None,
+        **options,
+    ) -> None:
         """Draw surfaces that ``visibility`` rays see, each with its material's function.
 
         ``stages`` are the pass's shader files. Options: ``full`` evaluates every material, else only those that let light
         through; ``units`` is the first texture unit free for materials; ``defines``; ``only`` draws materials with that
-        flag of CompiledGraph alone.
+        flag of CompiledGraph alone. Nothing is drawn that lies wholly in the box ``beyond``.
         """
         draws, prepared = self._prepared(planned, stages, visibility, options)
-        commands, counts = draws.visible(clip_from_world)
+        commands, counts = draws.visible(clip_from_world, beyond)
         if len(commands):
             draws.buffer.write(np.ascontiguousarray(commands))
         first = 0
@@ -429,8 +441,7 @@ class GPUScene:
     def close(self) -> None:
         """Free all GPU memory of this scene."""
         self.gl.release(*self._buffers.values(), *self._textures.values(), *(d.buffer for d in self._draws.values()))
-        for vao in self._vaos.values():
-            vao.release()
+        self._drop_vaos()
         self.__init__(self.gl)
 
 

@@ -15,6 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from . import atlas
+from .focus import Focus
 from .gpu_types import (
     LIGHT,
     LIGHT_AREA,
@@ -119,6 +120,8 @@ class Source:
     # World and meshes: this source draws points `index` of every `count` per sub-frame.
     index: int = 0
     count: int = 1
+    # A second shadow map, of the focus alone, where a backdrop would leave the first one coarse.
+    near: bool = False
 
 
 @dataclass
@@ -145,13 +148,23 @@ class LightRig:
     """The scene's sources, where their shadow and bounce maps lie, and what they are at a sub-frame."""
 
     sources: list[Source]
-    bounds: np.ndarray
+    focus: Focus
     world: WorldMap | None
     emitters: Emitters
     shadow: Maps
     bounce: Maps
     notes: list[str] = field(default_factory=list)
     direct_world: WorldMap | None = None  # the same world, its directions drawn as suits direct light
+
+    @property
+    def bounds(self) -> np.ndarray:
+        """Box (2, 3) of everything drawn, m."""
+        return self.focus.whole
+
+    @property
+    def region(self) -> np.ndarray:
+        """Box (2, 3) of what grids and bounce maps are for, m."""
+        return self.focus.region
 
     def moves(self, index: int, *, bounce: bool) -> bool:
         """Whether source ``index`` is another point in each sub-frame. Suns, spheres and discs bounce from their
@@ -181,11 +194,17 @@ class LightRig:
             if maps.first[i] < 0:
                 lights[i]["views"] = 0
                 continue
-            for face, (rows, perspective) in enumerate(self._faces(lights[i], source)):
+            faces = list(self._faces(lights[i], source))
+            # What the map covers across; of two maps of one light, the narrow one comes first.
+            spans = [self.region if bounce else self.bounds] * len(faces)
+            if source.near and not bounce:
+                faces, spans = faces * 2, [self.focus.core, *spans]
+                lights[i]["views"] = len(faces)
+            for face, ((rows, perspective), span) in enumerate(zip(faces, spans, strict=True)):
                 tile = maps.first[i] + face
                 view = np.zeros((), LIGHT_VIEW)
                 guard = 1.0 + 2.0 * _GUARD_TEXELS / maps.sizes[tile]
-                clips.append(self._fill_view(view, lights[i], rows, perspective, guard))
+                clips.append(self._fill_view(view, lights[i], rows, perspective, guard, span))
                 view["rect"] = (*maps.corners[tile], maps.sizes[tile], maps.sizes[tile])
                 view["light"] = i
                 view["map"] = MAP_BOUNCE if bounce else MAP_SHADOW
@@ -213,6 +232,12 @@ class LightRig:
     def shares(self, index: int) -> bool:
         """Whether the source's bounce map serves as its shadow map."""
         return self.shadow.first[index] < 0 <= self.bounce.first[index] and self.casts_shadow(index)
+
+    def beyond(self, view: int, light: int) -> np.ndarray | None:
+        """The box (2, 3) whose contents shadow map ``view`` of source ``light`` leaves out: what shades nothing outside the
+        narrow map of the same source. Coarse texels would."""
+        wide = self.sources[light].near and view > self.shadow.first[light]
+        return self.focus.core if wide else None
 
     def casts_shadow(self, index: int) -> bool:
         light = self.sources[index].light
@@ -332,8 +357,9 @@ class LightRig:
             for face in _FACES[: source.views]:
                 yield face @ basis, True
 
-    def _fill_view(self, view, light, rows: np.ndarray, perspective: bool, guard: float) -> np.ndarray:
-        """Fill a LIGHT_VIEW; returns its clip_from_world (4, 4) for drawing into the guarded tile."""
+    def _fill_view(self, view, light, rows: np.ndarray, perspective: bool, guard: float, span: np.ndarray) -> np.ndarray:
+        """Fill a LIGHT_VIEW; returns its clip_from_world (4, 4) for drawing into the guarded tile. ``span`` is the box
+        (2, 3) that parallel light's map covers across; along the light all maps hold everything."""
         low, high = self.bounds
         center, half = (low + high) / 2.0, (high - low) / 2.0
         rows = rows.copy()
@@ -341,11 +367,16 @@ class LightRig:
             origin = light["position_ws"].astype("f8")
             far = float(np.linalg.norm(np.abs(origin - center) + half)) * 1.001
             nearest = float(np.linalg.norm(np.maximum(np.abs(origin - center) - half, 0.0)))
-            near = max(_NEAR_SHARE * far, 0.5 * nearest / np.sqrt(3.0))
+            middle, reach = self.region.mean(axis=0), (self.region[1] - self.region[0]) / 2.0
+            share = _NEAR_SHARE * float(np.linalg.norm(np.abs(origin - middle) + reach))
+            near = max(min(share, _NEAR_SHARE * far), 0.5 * nearest / np.sqrt(3.0))
             far = max(far, near * 2.0, 1e-12)
         else:
             extent = np.abs(rows) @ half * 1.001 + 1e-9 * (1.0 + np.abs(center).max())
             middle = rows @ center
+            if span is not self.bounds:
+                extent[:2] = (np.abs(rows) @ (span[1] - span[0]) / 2.0 * 1.001)[:2] + 1e-9 * (1.0 + np.abs(center).max())
+                middle[:2] = (rows @ span.mean(axis=0))[:2]
             origin = rows.T @ np.array([middle[0], middle[1], middle[2] - extent[2]])
             rows[0] *= extent[0]
             rows[1] *= extent[1]
@@ -384,7 +415,7 @@ def spread_profile(half_spread: float) -> tuple[float, float]:
 
 def build_rig(
     lights: list[Light],
-    bounds: np.ndarray,
+    focus: Focus,
     *,
     world: WorldMap | None,
     world_samples: int,
@@ -423,7 +454,9 @@ def build_rig(
     if len(emitters) and area_lights:
         sources += [Source(LIGHT_MESH, 12, None, 6, True, k, emitter_samples) for k in range(emitter_samples)]
 
-    radius = 0.5 * float(np.linalg.norm(bounds[1] - bounds[0]))
+    for source in sources:
+        source.near = focus.narrow and source.kind in (LIGHT_SUN, LIGHT_WORLD)
+    radius = 0.5 * float(np.linalg.norm(focus.region[1] - focus.region[0]))
     coarser = _coarser_maps({s.seed: _power(s.light, radius) for s in sources if s.light is not None})
 
     def tiles(resolution: int, used, *, bounce: bool) -> Maps:
@@ -441,7 +474,7 @@ def build_rig(
             if bounce and source.light is not None:
                 base = max(16, base >> coarser[source.seed])
             size = base if source.views == 1 else base // 2
-            sizes += [max(16, size)] * source.views
+            sizes += [max(16, size)] * (source.views + int(source.near and not bounce))
         while sum(s * s for s in sizes) > texel_budget and max(sizes) > 16:
             sizes = [max(16, s // 2) for s in sizes]
         corners, size = atlas.pack(sizes, power_of_two=True)
@@ -460,7 +493,7 @@ def build_rig(
         return not (drawn_anew and bounce_resolution >= shadow_resolution and not coarse)
 
     return LightRig(
-        sources, bounds, world, emitters,
+        sources, focus, world, emitters,
         tiles(shadow_resolution, own_shadow_map, bounce=False), tiles(bounce_resolution, bounced, bounce=True),
         notes,
     )  # fmt: skip

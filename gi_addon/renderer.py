@@ -16,6 +16,7 @@ import numpy as np
 
 from .engines import TECHNIQUES
 from .facts import Facts, gather_facts
+from .focus import Focus, find_focus
 from .frame import Frame, ResourcePool
 from .gl import GL, Cancelled, CancelToken, GLThread, shared
 from .gl.timers import PassTimers
@@ -69,6 +70,7 @@ class Renderer:
         self._planned_key: tuple | None = None
         self._plan: Plan | None = None
         self._world_maps: tuple[tuple, WorldMap | None] | None = None
+        self._focus: tuple[tuple, Focus] | None = None
         self._emitter_cache: tuple[tuple, Emitters] | None = None
         self.frame: Frame | None = None
 
@@ -108,13 +110,17 @@ class Renderer:
         if min(resolution) < 1 or min(region[2:]) < 1:
             raise RenderError(f"a picture of {region[2]} × {region[3]} pixels has nothing to render")
 
+        # What is drawn lies near the origin: 32-bit coordinates are too coarse far from it.
+        origin = scene.far_origin()
+        if origin.any():
+            scene, camera = scene.moved(-origin), camera.moved(-origin)
         stamps = scene.stamps()
         self.gpu.sync(scene, stamps)
         size = (int(region[2]), int(region[3]))
         subframes = subframes or settings.samples
         facts = gather_facts(
             scene, self.gpu.compiled, settings, size, outputs, subframes, self._world_map(scene),
-            self._emitters(scene, stamps),
+            self._emitters(scene, stamps), self._find_focus(scene, stamps),
         )
         facts.stamps = stamps
         key = (
@@ -139,6 +145,7 @@ class Renderer:
             self._view_buffer, self._screen_vao,
         )  # fmt: skip
         self.frame.film_transparent = film_transparent
+        self.frame.world_origin = origin
         return self._plan
 
     @staticmethod
@@ -239,8 +246,18 @@ class Renderer:
         self.gl.check("the frame")
         return Result(
             passes, planned, subframes, time.perf_counter() - start, self.timers.collect(),
-            [*scene.notes, *self.frame.facts.rig.notes],
+            self.notes(scene),
         )  # fmt: skip
+
+    def notes(self, scene: Scene) -> list[str]:
+        """What the user should know of the frame that has begun."""
+        facts = self.frame.facts
+        notes = [*scene.notes, *facts.rig.notes]
+        if not facts.visible:
+            notes.append("the camera sees no surface: there is none, or all are hidden from it")
+        if not facts.lit and not facts.emissive and facts.world_black:
+            notes.append("nothing gives light: there is no light that shines, no emissive surface, and the world is black")
+        return notes
 
     # -- helpers -------------------------------------------------------------------------------------------------
 
@@ -254,6 +271,12 @@ class Renderer:
         if self._emitter_cache is None or self._emitter_cache[0] != key:
             self._emitter_cache = (key, find_emitters(scene, self.gpu.compiled))
         return self._emitter_cache[1]
+
+    def _find_focus(self, scene: Scene, stamps: dict[str, str]) -> Focus:
+        key = (stamps["meshes"], stamps["transforms"])
+        if self._focus is None or self._focus[0] != key:
+            self._focus = (key, find_focus(scene))
+        return self._focus[1]
 
     def _world_map(self, scene: Scene) -> WorldMap | None:
         """The world as a map, evaluated on the GPU unless it is one colour."""

@@ -25,6 +25,11 @@ SNAPSHOT_VERSION = 1
 _uids = itertools.count(1)
 
 
+def new_uid() -> int:
+    """An identity that nothing else in this process has."""
+    return next(_uids)
+
+
 class SnapshotError(ValueError):
     """A snapshot file is missing, damaged, or of another version."""
 
@@ -61,6 +66,11 @@ class ShaderGraph:
     nodes: tuple[Node, ...] = ()
     surface: Link | None = None
     volume: Link | None = None
+
+    def reads(self, kind: str, output: str) -> bool:
+        """Whether a node reads ``output`` of one of ``kind``."""
+        links = (v for n in self.nodes for v in n.inputs.values() if isinstance(v, Link))
+        return any(v.output == output and self.nodes[v.node].kind == kind for v in links)
 
 
 # --- parts of a scene -------------------------------------------------------------------------------------------------
@@ -197,6 +207,12 @@ class Camera:
     def orthographic(self) -> bool:
         return bool(self.clip_from_view[3, 3] == 1.0)
 
+    def moved(self, offset: np.ndarray) -> Camera:
+        """This camera ``offset`` (3,) m further."""
+        matrix = np.array(self.world_from_view, "f8")
+        matrix[:3, 3] += offset
+        return replace(self, world_from_view=matrix)
+
 
 @dataclass(eq=False)
 class World:
@@ -212,6 +228,8 @@ class World:
 CAMERA, DIFFUSE, GLOSSY, TRANSMISSION, VOLUME, SHADOW = (1 << i for i in range(6))
 ALL_RAYS = 63
 HOLDOUT = 64
+# Mesh attribute that the Geometry node's Pointiness reads.
+POINTINESS = ".pointiness"
 
 
 @dataclass(eq=False)
@@ -286,6 +304,32 @@ class Scene:
         if len(boxes) == 0:
             return np.array([[-0.5] * 3, [0.5] * 3])
         return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
+
+    def far_origin(self) -> np.ndarray:
+        """A point (3,) near the scene's middle if that is far from the origin for the scene's size, else the origin.
+
+        32-bit coordinates at distance D are D/2²⁴ apart; up to 16 radii that costs four bits, which everything is made to
+        bear. Steps of 16 radii, rounded up to a power of two, keep the point where it is while objects move about.
+        """
+        low, high = self.bounds()
+        radius = 0.5 * float(np.linalg.norm(high - low))
+        middle = (low + high) / 2.0
+        if not np.isfinite(middle).all() or float(np.abs(middle).max()) <= 16.0 * radius or radius <= 0.0:
+            return np.zeros(3)
+        step = 2.0 ** np.ceil(np.log2(16.0 * radius))
+        return np.round(middle / step) * step
+
+    def moved(self, offset: np.ndarray) -> Scene:
+        """This scene with everything placed ``offset`` (3,) m further; meshes, materials and images are shared."""
+        shift = np.zeros((4, 4))
+        shift[:3, 3] = offset
+        camera = self.camera
+        return replace(
+            self,
+            instances=replace(self.instances, matrix=self.instances.matrix + shift),
+            lights=[replace(light, matrix=light.matrix + shift) for light in self.lights],
+            camera=camera and camera.moved(offset),
+        )
 
     # -- identity ------------------------------------------------------------------------------------------------
 

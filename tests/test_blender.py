@@ -169,6 +169,27 @@ def test_a_border_renders_its_part_of_the_picture(blender, gl, crop):
     assert np.abs(got - expected).mean() <= 0.01 * expected.mean()
 
 
+def test_a_border_has_the_rows_that_blender_gives_it(blender, gl):
+    """0.9 × 50 rows is 45 in Blender's 32-bit numbers: no row of the border stays black."""
+    bpy = blender
+    scene = put(bpy, scenes.cornell(), samples=1)
+    r = scene.render
+    r.resolution_x, r.resolution_y, r.use_border, r.use_crop_to_border = 89, 50, True, True
+    r.border_min_x, r.border_max_x, r.border_min_y, r.border_max_y = 0.3, 0.8, 0.2, 0.9
+    color = quartet(scene, "Diffuse Color")["Diffuse Color"][..., 0]
+    assert color.shape == (35, 45)
+    assert (color.max(axis=1) > 0.0).all() and (color.max(axis=0) > 0.0).all()
+
+
+def test_a_view_layers_material_override_is_on_everything(blender, gl):
+    bpy = blender
+    scene = put(bpy, scenes.cornell(), samples=1)
+    scene.view_layers[0].material_override = diffuse(bpy, "Override", (0.1, 0.6, 0.2))
+    color = quartet(scene, "Diffuse Color")["Diffuse Color"]
+    seen = color.max(axis=-1) > 0.0
+    np.testing.assert_allclose(color[seen], np.broadcast_to((0.1, 0.6, 0.2), color[seen].shape), atol=2e-3)
+
+
 def test_view_layers_and_materials_linked_to_objects(blender, gl):
     bpy = blender
     scene = put(bpy, scenes.cornell())

@@ -9,6 +9,7 @@ from conftest import make
 
 from gi_addon import atlas
 from gi_addon.compare import scenes
+from gi_addon.focus import Focus
 from gi_addon.gl import shared
 from gi_addon.gpu_types import LIGHT_WORLD
 from gi_addon.lights import Emitters, build_rig, spread_profile
@@ -127,7 +128,7 @@ def test_lights_that_are_not_numbers_are_left_out_with_a_note():
     bad.matrix[0, 3] = np.nan
     off = scenes.point_light((0, 0, 1), 0.0)
     rig = build_rig(
-        [good, bad, off], np.array([[-1.0] * 3, [1.0] * 3]), world=None, world_samples=1, emitters=Emitters.none(),
+        [good, bad, off], Focus.on(np.array([[-1.0] * 3, [1.0] * 3])), world=None, world_samples=1, emitters=Emitters.none(),
         emitter_samples=1, area_lights=True, shadows=True, bounces=True, shadow_resolution=64, bounce_resolution=64,
         world_resolution=64,
     )  # fmt: skip
@@ -176,7 +177,7 @@ def test_tiles_of_an_atlas_do_not_overlap():
 
 
 def test_sources_move_with_the_subframes_only_where_they_have_an_extent(gl):
-    bounds = np.array([[-1.0] * 3, [1.0] * 3])
+    bounds = Focus.on(np.array([[-1.0] * 3, [1.0] * 3]))
     rig = build_rig(
         [scenes.point_light((0, 0, 1), 10.0), scenes.point_light((0, 0, 1), 10.0, 0.2)], bounds,
         world=WorldMap(np.ones((16, 32, 3))), world_samples=2, emitters=Emitters.none(), emitter_samples=1,

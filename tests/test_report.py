@@ -194,6 +194,31 @@ def test_a_slow_candidate_has_fewer_frames(gl, tmp_path):
     assert record["frames"] == 2 and record["worst_ms"] >= record["moving_ms"] > 0 and record["p95"] >= record["ms"]
 
 
+def test_a_peer_is_warmed_up_once_for_each_way_it_renders(gl, tmp_path):
+    """A first picture that is not timed for each ray tracing and denoiser, none for another number of samples."""
+    asked = []
+
+    def peer(candidate, names):
+        asked.append(candidate)
+        return {"Combined": np.full((9, 16, 4), 0.5, "f4")}, 0.25
+
+    candidates = peer_sweep("eevee", "quick")
+    runs = study.measure(
+        scenes.cornell(),
+        "key",
+        (16, 9),
+        candidates,
+        base=Settings(),
+        driver="test",
+        cache=tmp_path,
+        peer=peer,
+        repeats=1,
+        visits=1,
+    )
+    assert len(asked) == len(candidates) + 2 and asked[0] == asked[1] and asked[2] == asked[3]
+    assert all(r.times == [250.0] and r.passes["Combined"].shape == (9, 16, 3) for r in runs)
+
+
 def test_the_blender_that_eevee_runs_in_is_named_or_found(blender, tmp_path, monkeypatch):
     """The option wins over the environment, that over the path; what is named must be there."""
     from gi_addon.host import eevee

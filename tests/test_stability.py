@@ -174,3 +174,12 @@ def test_an_interrupted_suite_goes_on_where_it_stopped(gl, tmp_path, monkeypatch
         path.write_bytes(b"damaged")
     stability.run(["SSDO"], ["16"], cache=tmp_path)
     assert ran[4:] == ["16"]
+
+
+def test_a_mirrored_scene_looks_mirrored(gl):
+    """Reflections are among test 4b's 48: light must not care that triangles and axes are inside out."""
+    suite = Suite("LPV")
+    plain = suite.indirect(scenes.cornell(light="point"), samples=4)
+    mirrored = suite.indirect(scenes.transformed(scenes.cornell(light="point"), np.diag([-1.0, 1, 1, 1])), samples=4)
+    suite.close()
+    assert np.abs(mirrored[:, ::-1] - plain).mean() < 0.02 * plain.mean()

@@ -168,16 +168,21 @@ def closed_forms(
         resolution = int(settings.get(traits.blockers))
         if wall and wall_limit and math.isfinite(wall_limit):
             asked = math.ceil(extent * wall_limit / wall)
-            state = "holds" if resolution >= asked else f"set to {resolution}"
+            least = int(next(m.low for p, _, m in walk() if p == traits.blockers))
+            state = f"set to {resolution}" + (": holds" if resolution >= asked else "")
             lines.append(
-                f"{traits.blockers} {asked}: cell ≤ thinnest wall / w* = {wall:.3g} m / {wall_limit:g}, over {extent:.3g} m "
-                f"({state})"
+                f"{traits.blockers} at least {max(asked, least)}: cell ≤ thinnest wall / w* = {wall:.3g} m / {wall_limit:g}, "
+                f"over {extent:.3g} m ({state})"
             )
         elif wall:
             lines.append(f"{traits.blockers}: no cell size keeps light out of walls (w* was not reached up to 4 cells)")
         path = f"{settings.technique.lower()}.iterations"
         if has_setting(path):
-            lines.append(f"{path} {resolution}: the scene's extent in cells (set to {settings.get(path)})")
+            # Light steps over a face at a time: corner to corner are three sides of the box.
+            steps = math.ceil(float((bounds[1] - bounds[0]).sum()) / extent * resolution)
+            chosen = int(settings.get(path))
+            state = "0: light crosses the whole grid" if chosen == 0 else "holds" if chosen >= steps else f"set to {chosen}"
+            lines.append(f"{path} {steps}: cells from corner to corner of the scene, face by face ({state})")
     lines += [f"no {task.title}: {reason}" for task, reason in plan.skipped]
     return lines
 
@@ -185,10 +190,13 @@ def closed_forms(
 # --- measuring -------------------------------------------------------------------------------------------------------------
 
 
-def dearer(settings: Settings) -> list[tuple[str, Settings]]:
-    """The next dearer setting along every axis: twice the sub-frames, the next value up of each of the technique's own."""
+def dearer(settings: Settings, against: str) -> list[tuple[str, Settings]]:
+    """The next dearer setting along every axis: twice the sub-frames, the next value up of each of the technique's own.
+    More bounces are none where the reference ``against`` has one: they model something else."""
     out = []
     paths = [p for p in dict.fromkeys(("samples", *AXES.get(settings.technique, {}))) if has_setting(p)]
+    if against == "R1":
+        paths.remove("bounces")
     for path in paths:
         value = settings.get(path)
         if isinstance(value, bool) or not isinstance(value, (int, float)):
@@ -233,7 +241,7 @@ def certify(
         defaults = Settings()
         changed = {p: v for p, v in settings.as_dict().items() if p != "technique" and _differs(v, defaults.get(p))}
         out = Certificate(settings.technique, changed, against, s, low, high, ms)
-        for label, other in dearer(settings):
+        for label, other in dearer(settings, against):
             progress(f"dearer: {label}")
             picture, cost, _ = measured(studio, other)
             out.steps.append(Step(label, 1.0 - rel_mse(picture, a, b) / max(s.rel_mse, 1e-12), cost / ms))

@@ -115,7 +115,8 @@ def pareto_figure(record: dict, component: str, reference: str, metric: str = "r
                     "line": {"width": 1, "color": INK},
                 },
                 hovertext=[
-                    f"<b>{esc(p['method'])}</b><br>{esc(p['label'])}<br>{p['x']:.4g} ms ± {p['mad']:.2g}, {p['frames']} frames"
+                    f"<b>{esc(p['method'])}</b><br>{esc(p['label'])}"
+                    f"<br>{p['x']:.4g} ms ± {p['mad']:.2g}, P95 {number(p['p95'])} ({p['frames']} frames)"
                     f"<br>relMSE {number(p['score']['rel_mse'])} [{number(p['score']['low'])} … {number(p['score']['high'])}]"
                     f"<br>gain {number(p['score']['gain'])}, FLIP {number(p['score']['flip'])}"
                     + (f"<br>{p['mib']:.1f} MiB" if p.get("mib") else "")

@@ -404,7 +404,7 @@ def effect(name: str) -> Scene:
         matrix = np.eye(4)
         matrix[:3, 3] = (-0.8, 0, 0.6)
         wax = principled("Wax", Base_Color=(0.8, 0.6, 0.4, 1.0), Subsurface_Weight=1.0, Subsurface_Radius=(0.5, 0.25, 0.12),
-                         Roughness=1.0)  # fmt: skip
+                         Subsurface_Scale=0.2, Roughness=1.0)  # fmt: skip
         b.add(sphere(0.6, 48, 24), wax, matrix)
         paper = Material("Paper", ShaderGraph((Node("BSDF_TRANSLUCENT", "Paper", {"Color": (0.8, 0.75, 0.6)}),), Link(0, "BSDF")))
         b.quads(np.array([[[0.3, 0, 0], [1.5, 0, 0], [1.5, 0, 1.4], [0.3, 0, 1.4]]]), paper)
@@ -428,15 +428,19 @@ def effect(name: str) -> Scene:
 
 
 def transformed(scene: Scene, matrix: np.ndarray) -> Scene:
-    """``scene`` moved, turned and scaled (uniformly) by ``matrix`` (4, 4), in place. Power goes with the square of the
-    scale, so that radiance stays; sun strength is that of a surface already."""
-    scale = float(np.cbrt(np.linalg.det(matrix[:3, :3])))
+    """``scene`` moved, turned, scaled (uniformly) and mirrored by ``matrix`` (4, 4), in place. Power goes with the square of
+    the scale, so that radiance stays; sun strength is that of a surface already. Of a mirrored scene the picture is
+    mirrored from left to right."""
+    determinant = np.linalg.det(matrix[:3, :3])
+    scale = float(np.cbrt(abs(determinant)))
     rigid = matrix.copy()
     rigid[:3, :3] /= scale
+    # Lights and cameras have right-handed axes: mirrored once more along their own x they have again.
+    handed = np.diag([np.sign(determinant), 1.0, 1.0, 1.0])
     inst = scene.instances
     inst.matrix = matrix @ inst.matrix
     for i, light in enumerate(scene.lights):
-        moved = rigid @ light.matrix
+        moved = rigid @ light.matrix @ handed
         moved[:3, 3] = (matrix @ light.matrix)[:3, 3]
         scene.lights[i] = replace(
             light, matrix=moved, radius=light.radius * scale, size=tuple(scale * v for v in light.size),
@@ -444,10 +448,10 @@ def transformed(scene: Scene, matrix: np.ndarray) -> Scene:
         )  # fmt: skip
     camera = scene.camera
     if camera is not None:
-        pose = rigid @ camera.world_from_view
+        pose = rigid @ camera.world_from_view @ handed
         pose[:3, 3] = (matrix @ camera.world_from_view)[:3, 3]
         near, far = camera.clip_start * scale, camera.clip_end * scale
-        projection = camera.clip_from_view.copy()
+        projection = handed @ camera.clip_from_view @ handed
         if camera.orthographic:
             projection[0, 0], projection[1, 1] = projection[0, 0] / scale, projection[1, 1] / scale
             projection[2] = [0, 0, -2 / (far - near), -(far + near) / (far - near)]

@@ -149,7 +149,7 @@ class QuartetEngine(bpy.types.RenderEngine):
                 self._free()
 
     def _fail(self, message: str) -> None:
-        status.failed(message)
+        status.failed("final", message)
         self.error_set(f"Quartet: {message}")
         self.report({"ERROR"}, f"Quartet: {message}")
 
@@ -267,8 +267,9 @@ def picture(render: bpy.types.RenderSettings) -> tuple[tuple[int, int], tuple[in
     height = render.resolution_y * render.resolution_percentage // 100
     if not render.use_border:
         return (width, height), (0, 0, width, height)
-    x0, x1 = int(render.border_min_x * width), int(render.border_max_x * width)
-    y0, y1 = int(render.border_min_y * height), int(render.border_max_y * height)
+    # In 32 bits, as Blender does: 0.9 × 50 is 45 there, and just below it in 64.
+    x0, x1 = (int(np.float32(v) * np.float32(width)) for v in (render.border_min_x, render.border_max_x))
+    y0, y1 = (int(np.float32(v) * np.float32(height)) for v in (render.border_min_y, render.border_max_y))
     return (width, height), (x0, y0, max(0, x1 - x0), max(0, y1 - y0))
 
 
@@ -297,13 +298,20 @@ def standard_panels() -> list[type]:
     return out
 
 
+@bpy.app.handlers.persistent
+def _another_file(*_) -> None:
+    status.forget()
+
+
 def register() -> None:
     bpy.utils.register_class(QuartetEngine)
+    bpy.app.handlers.load_post.append(_another_file)
     for panel in standard_panels():
         panel.COMPAT_ENGINES.add("QUARTET")
 
 
 def unregister() -> None:
+    bpy.app.handlers.load_post.remove(_another_file)
     for panel in bpy.types.Panel.__subclasses__():
         engines = getattr(panel, "COMPAT_ENGINES", None)
         if engines and "QUARTET" in engines:

@@ -169,6 +169,9 @@ class _Walk:
         if node.kind == "MATH" and node.params.get("operation") in BINARY:
             a, b = self.number(get("Value", 0.5), depth), self.number(get("Value_001", 0.5), depth)
             return float(BINARY[node.params["operation"]](a, b))
+        if node.kind == "TEX_CHECKER":
+            pair = [self.color(get(name, 0.8), depth) for name in ("Color1", "Color2")]
+            return np.mean(pair, axis=0) if value.output == "Color" else 0.5
         if node.kind == "MIX":
             suffix = {"RGBA": "Color", "VECTOR": "Vector"}.get(node.params.get("data_type"), "Float")
             return self._blend(node.params.get("blend_type", "MIX") if suffix == "Color" else "MIX",

@@ -157,4 +157,5 @@ def draw_light_maps(frame: Frame, planned: Planned, visibility: int, fragment: s
                 light_perspective=float(view["perspective"]),
             )
         clip = np.ascontiguousarray(sample.clip_from_world[i].T, "f4")
-        frame.gpu.draw(planned, stages, visibility, clip, **options)
+        beyond = None if full else rig.beyond(i, int(view["light"]))
+        frame.gpu.draw(planned, stages, visibility, clip, beyond=beyond, **options)

@@ -39,7 +39,7 @@ class CellGrid:
 
 def cell_grid(facts: Facts) -> CellGrid:
     """The frame's grid."""
-    return CellGrid.over(facts.rig.bounds, facts.settings.rsm.visibility_resolution)
+    return CellGrid.over(facts.rig.region, facts.settings.rsm.visibility_resolution)
 
 
 CELL_UNIFORMS = (

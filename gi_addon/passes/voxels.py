@@ -71,7 +71,7 @@ class VoxelGrid:
 
 def voxel_grid(facts: Facts) -> VoxelGrid:
     """The frame's grid."""
-    return VoxelGrid.around(facts.rig.bounds, facts.settings.vct.resolution)
+    return VoxelGrid.around(facts.rig.region, facts.settings.vct.resolution)
 
 
 def _size(facts: Facts) -> tuple[int, int, int]:

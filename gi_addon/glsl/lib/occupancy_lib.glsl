@@ -29,6 +29,16 @@ float cells_step(vec3 p, vec3 inverse, vec3 forward, float level)
 // A surface's point lifted clear of the cells that the surface fills.
 vec3 cells_clear(vec3 position_ws, vec3 n) { return position_ws + n * (dot(abs(n), vec3(1.0)) * cell_size); }
 
+// The distance (in cells) at which a ray from `start` (in cells) enters the grid, and the one at which it leaves.
+vec2 cells_span(vec3 start, vec3 inverse)
+{
+    vec3 a = -start * inverse;
+    vec3 b = (vec3(textureSize(occupancy, 0)) - start) * inverse;
+    vec3 low = min(a, b);
+    vec3 high = max(a, b);
+    return vec2(max(max(low.x, low.y), max(low.z, 0.0)), min(high.x, min(high.y, high.z)));
+}
+
 // Whether something stands between two points, each already lifted off its own surface. A run of cells that holds an end
 // point is that point's own neighbourhood (a corner, a contact), not an obstacle: only what has free cells before and
 // behind it blocks.
@@ -41,12 +51,14 @@ bool cells_block(vec3 from_ws, vec3 to_ws)
     direction = mix(direction, vec3(1e-6), lessThan(abs(direction), vec3(1e-6)));
     vec3 inverse = 1.0 / direction;
     vec3 forward = step(0.0, direction);
-    float t = 0.0;
-    bool free_before = false;
+    // Outside the grid all is free.
+    vec2 span = cells_span(start, inverse);
+    float t = span.x > 0.0 ? span.x + 1e-3 : 0.0;
+    bool free_before = span.x > 0.0;
     bool inside = false;
     bool blocked = false;
     for (int i = 0; i < CELL_STEPS; ++i) {
-        if (t < far && !blocked) {
+        if (t < min(far, span.y) && !blocked) {
             vec3 p = start + direction * t;
             float level = cells_level(p);
             bool solid = level < 0.5;
@@ -59,16 +71,6 @@ bool cells_block(vec3 from_ws, vec3 to_ws)
         }
     }
     return blocked;
-}
-
-// The distance (in cells) at which a ray from `start` (in cells) enters the grid, and the one at which it leaves.
-vec2 cells_span(vec3 start, vec3 inverse)
-{
-    vec3 a = -start * inverse;
-    vec3 b = (vec3(textureSize(occupancy, 0)) - start) * inverse;
-    vec3 low = min(a, b);
-    vec3 high = max(a, b);
-    return vec2(max(max(low.x, low.y), max(low.z, 0.0)), min(high.x, min(high.y, high.z)));
 }
 
 // Along the unit `direction`, from `after` (m) on: how far (m) the first free cell is, and where the first cell with a surface

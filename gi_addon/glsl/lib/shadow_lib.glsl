@@ -154,11 +154,16 @@ vec2 shadow_wide(sampler2D map, LightView v, ReceiverPlane plane, vec2 texel, fl
     return lit;
 }
 
-// Which of a light's views sees a point: the face with the largest depth.
+// Which of a light's views sees a point: the face with the largest depth; of parallel light the narrow map, the first, where it
+// reaches.
 int light_view_of(Light light, vec3 position_ws)
 {
     if (light.views <= 1) {
         return light.first_view;
+    }
+    if (light_is_directional(light)) {
+        vec2 at = abs(light_view_project(light_views[light.first_view], position_ws).xy);
+        return light.first_view + (max(at.x, at.y) <= 1.0 ? 0 : 1);
     }
     // Faces in order +z, +x, −x, +y, −y, −z of the light's own frame (gi_addon/lights.py).
     int best = light.first_view;

@@ -52,7 +52,7 @@ void main()
             // Light from behind a flat triangle does not reach its front, whatever the shading normal says. A triangle
             // that stands for a curved surface is lit up to where that surface turns away.
             bool behind = dot(ng, l) <= 0.0;
-            if (cos_l <= 0.0 || (behind && depth_bulge.g <= 0.0) || max3(arriving) <= 0.0) {
+            if (cos_l <= 0.0 || (behind && depth_bulge.g <= 0.0) || max3(abs(arriving)) <= 0.0) {
                 continue;
             }
             vec3 receiver_ws = position_ws + n * depth_bulge.g;
@@ -83,10 +83,6 @@ void main()
         diffuse = lit_light * INV_PI;
 #if HAS_WORLD_DIFFERENCE
         diffuse += texelFetch(world_difference, pixel, 0).rgb;
-#endif
-#if HAS_DIRECT_SUBSURFACE
-        vec4 below = texelFetch(direct_subsurface, pixel, 0);
-        diffuse = mix(diffuse, below.rgb, below.a);
 #endif
 #if HAS_SCREEN_LIGHT
         diffuse += texelFetch(screen_light, pixel, 0).rgb; // the world and emissive pixels, where screen space gathers them

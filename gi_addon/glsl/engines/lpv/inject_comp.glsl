@@ -36,6 +36,9 @@ void main()
         }
     }
     vec3 at = (t.position_ws - grid_origin) / grid_cell + t.normal_ws * half_cell_shift(t.normal_ws);
+    if (any(lessThan(at, vec3(-1.0))) || any(greaterThan(at, vec3(grid_size) + 1.0))) {
+        return; // a backdrop far outside (gi_addon/focus.py)
+    }
     ivec3 cell = clamp(ivec3(floor(at)), ivec3(0), grid_size - 1);
     int base = cell_index(cell, grid_size) * SH_COUNT * 3;
     float y[SH_COUNT];

@@ -14,12 +14,5 @@ float voxel_visibility(Light light, vec3 position_ws)
     float angle;
     light_arriving(light, position_ws, l, angle);
     float reach = light_is_directional(light) ? 1e30 : distance(light.position_ws, position_ws) / grid.cell - LIFT;
-    // Enters the grid here.
-    vec3 d = mix(l, vec3(1e-9), lessThan(abs(l), vec3(1e-9)));
-    vec3 enter = min(-start / d, (grid.size - start) / d);
-    float near = max(max(enter.x, max(enter.y, enter.z)), 0.0);
-    if (near >= reach) {
-        return 1.0;
-    }
-    return trace_open(voxel_sheets, voxel_kinds, grid, Cone(start + l * near, l, 0.0, reach - near, 0.0));
+    return trace_open(voxel_sheets, voxel_kinds, grid, Cone(start, l, 0.0, reach, 0.0));
 }

@@ -56,13 +56,12 @@ struct Cone {
 // The tangent of the half angle of a cone whose projected solid angle is `share` of the hemisphere's π: sin²θ = share.
 float cone_spread(float share) { return sqrt(share / max(1.0 - share, 1e-4)); }
 
-// Direction `j` about +z: points of the R2 sequence (M. Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences",
-// 2018: multiples of 1/g and 1/g², g³ = g + 1, here in units of 2^−32), whose every run is even, on the disc.
+// Direction `j` about +z: the R2 sequence, whose every run is even, on the disc.
 vec3 cone_direction(uint j)
 {
-    float r2 = unit_float(j * 3242174889u + 0x80000000u);
-    float phi = TAU * unit_float(j * 2447445414u + 0x80000000u);
-    return vec3(sqrt(r2) * vec2(cos(phi), sin(phi)), sqrt(1.0 - r2));
+    vec2 u = r2_sequence(j);
+    float phi = TAU * u.y;
+    return vec3(sqrt(u.x) * vec2(cos(phi), sin(phi)), sqrt(1.0 - u.x));
 }
 
 // Which side of a surface in the grid a point on it with normal `n` lies on, by the sheet of its own cell.
@@ -91,6 +90,14 @@ float cone_end(Cone cone, Grid grid)
     vec3 d = mix(cone.direction, vec3(1e-9), lessThan(abs(cone.direction), vec3(1e-9)));
     vec3 far = max(-cone.start / d, (grid.size - cone.start) / d);
     return min(min(far.x, min(far.y, far.z)), cone.reach);
+}
+
+// Enters the grid here: 0 where it starts within.
+float cone_begin(Cone cone, Grid grid)
+{
+    vec3 d = mix(cone.direction, vec3(1e-9), lessThan(abs(cone.direction), vec3(1e-9)));
+    vec3 near = min(-cone.start / d, (grid.size - cone.start) / d);
+    return max(max(near.x, max(near.y, near.z)), 0.0);
 }
 
 // The first sheet in a cell that the ray meets between `t` and `t_out`.
@@ -172,7 +179,7 @@ ConeResult trace_cone(sampler3D atlas, sampler3D back, sampler3D sheets, sampler
 {
     ConeResult result = ConeResult(vec3(0.0), 1.0, NOTHING_MET);
     float end = cone_end(cone, grid);
-    float t = 0.0;
+    float t = cone_begin(cone, grid);
     for (int layer = 0; layer < CONE_MOST_LAYERS; ++layer) {
         if (t >= end || result.transmittance < CONE_END) {
             break;
@@ -192,7 +199,7 @@ float trace_open(sampler3D sheets, sampler3D kinds, Grid grid, Cone cone)
 {
     float transmittance = 1.0;
     float end = cone_end(cone, grid);
-    float t = 0.0;
+    float t = cone_begin(cone, grid);
     for (int layer = 0; layer < CONE_MOST_LAYERS; ++layer) {
         if (t >= end || transmittance < CONE_END) {
             break;
