@@ -112,7 +112,7 @@ class GPUScene:
             self.compiled = self.materials.compile(scene.materials, scene.images)
             self._upload_params()
             self._material_key = material_key
-            self._vaos.clear()
+            self._drop_vaos()
             self._drop_draws()
             self.uploads["materials"] = len(self.compiled)
         if self._world_key != scene.world.uid:
@@ -142,7 +142,7 @@ class GPUScene:
                 old.write(np.ascontiguousarray(data))
             return old
         self.gl.release(old)
-        self._vaos.clear()
+        self._drop_vaos()
         self._buffers[name] = self.gl.buffer(f"scene {name}", np.ascontiguousarray(data))
         return self._buffers[name]
 
@@ -185,7 +185,7 @@ class GPUScene:
                     if part.shape[1] < width == 4:
                         data[start : start + len(part), 3] = 1.0
             self._streams[name] = self._buffer(f"attribute {name}", data)
-        self._vaos.clear()
+        self._drop_vaos()
         self._build_groups(scene)
 
     def _build_groups(self, scene: Scene) -> None:
@@ -206,6 +206,11 @@ class GPUScene:
     def _drop_draws(self) -> None:
         self.gl.release(*(draws.buffer for draws in self._draws.values()))
         self._draws.clear()
+
+    def _drop_vaos(self) -> None:
+        # Released by hand: moderngl leaves what Python forgets to the driver for as long as the context lives.
+        self.gl.release(*self._vaos.values())
+        self._vaos.clear()
 
     def _upload_instances(self, scene: Scene) -> None:
         inst = scene.instances
@@ -436,8 +441,7 @@ class GPUScene:
     def close(self) -> None:
         """Free all GPU memory of this scene."""
         self.gl.release(*self._buffers.values(), *self._textures.values(), *(d.buffer for d in self._draws.values()))
-        for vao in self._vaos.values():
-            vao.release()
+        self._drop_vaos()
         self.__init__(self.gl)
 
 

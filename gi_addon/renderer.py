@@ -246,8 +246,18 @@ class Renderer:
         self.gl.check("the frame")
         return Result(
             passes, planned, subframes, time.perf_counter() - start, self.timers.collect(),
-            [*scene.notes, *self.frame.facts.rig.notes],
+            self.notes(scene),
         )  # fmt: skip
+
+    def notes(self, scene: Scene) -> list[str]:
+        """What the user should know of the frame that has begun."""
+        facts = self.frame.facts
+        notes = [*scene.notes, *facts.rig.notes]
+        if not facts.visible:
+            notes.append("the camera sees no surface: there is none, or all are hidden from it")
+        if not facts.lit and not facts.emissive and facts.world_black:
+            notes.append("nothing gives light: there is no light that shines, no emissive surface, and the world is black")
+        return notes
 
     # -- helpers -------------------------------------------------------------------------------------------------
 

@@ -12,7 +12,7 @@ from . import presets
 from .effects import RESOURCES, source_of
 from .gl import shared
 from .host import comparison, status
-from .host.comparison import QUARTET_OT_compare
+from .host.comparison import QUARTET_OT_compare, QUARTET_OT_open_page
 from .host.operators import QUARTET_MT_presets, QUARTET_OT_add_preset, QUARTET_OT_preset, QUARTET_OT_split_view
 from .outputs import OUTPUTS
 from .settings import TECHNIQUES, Settings, walk
@@ -54,7 +54,7 @@ class _Panel:
         return self.layout.column()
 
 
-def lines(text: str, width: int = 52) -> list[str]:
+def lines(text: str, width: int) -> list[str]:
     """``text`` in lines for labels, which Blender does not wrap."""
     out: list[str] = []
     for word in text.split():
@@ -65,9 +65,21 @@ def lines(text: str, width: int = 52) -> list[str]:
     return out
 
 
+# About: a letter of Blender's font and what else stands in a line of a panel, in pixels at scale 1.
+_LETTER, _AROUND = 6.5, 75
+
+
+def _letters() -> int:
+    """How many letters fit into a line of the region that is being drawn."""
+    region = bpy.context.region
+    if region is None or region.width <= 1:
+        return 52
+    return max(16, int((region.width / bpy.context.preferences.system.ui_scale - _AROUND) / _LETTER))
+
+
 def _say(layout, text: str, icon: str = "NONE") -> None:
     column = layout.column(align=True)
-    for number, line in enumerate(lines(text)):
+    for number, line in enumerate(lines(text, _letters())):
         column.label(text=line, icon=icon if number == 0 else "BLANK1" if icon != "NONE" else "NONE")
 
 
@@ -95,9 +107,10 @@ class QUARTET_PT_technique(_Panel, bpy.types.Panel):
 
     def draw(self, context):
         settings = context.scene.quartet
-        if status.problem:
+        _watch()
+        if status.problem():
             box = self.layout.box()
-            _say(box, status.problem, "ERROR")
+            _say(box, status.problem(), "ERROR")
         row = self.layout.row(align=True)
         for name, preset in presets.PRESETS.items():
             row.operator(QUARTET_OT_preset.bl_idname, text=preset.label).preset = name
@@ -248,7 +261,7 @@ class QUARTET_PT_compare(_Panel, bpy.types.Panel):
         layout = self.layout
         window = context.window_manager.quartet
         column = self._column()
-        for name in ("reference", "reference_samples", "compare_percentage"):
+        for name in ("reference", "reference_samples", "compare_percentage", "open_page"):
             column.prop(window, name)
         row = layout.row()
         row.operator(QUARTET_OT_compare.bl_idname, icon="RENDER_STILL")
@@ -272,6 +285,7 @@ class QUARTET_PT_compare(_Panel, bpy.types.Panel):
             grid.label(text=name)
             for value in (score.gain, score.rel_mse, score.noise_floor, score.flip):
                 grid.label(text=f"{value:.3g}")
+        box.operator(QUARTET_OT_open_page.bl_idname, icon="URL")
         _say(box, "relMSE is the error beyond Cycles' own noise; gain is the ratio of all light")
 
 
@@ -337,6 +351,44 @@ class QUARTET_PT_world_distance(_Panel, bpy.types.Panel):
         self._column().prop(context.scene.world.light_settings, "distance")
 
 
+def _render_menu(menu, context) -> None:
+    """The operators in the *Render* menu: there Blender's search (F3) finds them, and a right click gives them a key."""
+    if context.engine != "QUARTET":
+        return
+    layout = menu.layout
+    layout.separator()
+    layout.operator_context = "INVOKE_DEFAULT"
+    layout.operator(QUARTET_OT_compare.bl_idname, icon="RENDER_STILL")
+    layout.operator(QUARTET_OT_open_page.bl_idname, icon="URL")
+    layout.operator(QUARTET_OT_split_view.bl_idname, icon="WINDOW")
+    layout.operator_menu_enum(QUARTET_OT_preset.bl_idname, "preset", icon="PRESET")
+
+
+# --- redrawing --------------------------------------------------------------------------------------------------------
+
+# Frames end on other threads, which must not touch the interface: while the panels are in use a timer looks for news.
+_LOOK = 0.5  # seconds
+_seen = -1
+
+
+def _watch() -> None:
+    if not bpy.app.timers.is_registered(_look):
+        bpy.app.timers.register(_look, first_interval=_LOOK)
+
+
+def _look() -> float | None:
+    """Redraw the panels if there is something new to say; ends when no window shows the engine."""
+    global _seen
+    windows = [w for m in bpy.data.window_managers for w in m.windows if w.scene.render.engine == "QUARTET"]
+    if status.changes != _seen:
+        _seen = status.changes
+        for window in windows:
+            for area in window.screen.areas:
+                if area.type == "PROPERTIES":
+                    area.tag_redraw()
+    return _LOOK if windows else None
+
+
 _classes: list[type] = []
 
 
@@ -350,9 +402,13 @@ def register() -> None:
         if hasattr(cls, "COMPAT_ENGINES"):
             cls.COMPAT_ENGINES.add("QUARTET")
         bpy.utils.register_class(cls)
+    bpy.types.TOPBAR_MT_render.append(_render_menu)
 
 
 def unregister() -> None:
+    bpy.types.TOPBAR_MT_render.remove(_render_menu)
+    if bpy.app.timers.is_registered(_look):
+        bpy.app.timers.unregister(_look)
     for cls in reversed(_classes):
         bpy.utils.unregister_class(cls)
     _classes.clear()

@@ -170,10 +170,15 @@ def run(script: str, tmp_path: Path, *options: str, timeout: int = 600, profile:
     return json.loads(answer.read_text())
 
 
-def run_window(steps: str, tmp_path: Path, *options: str, size: str = "1000x700", timeout: int = 600) -> dict:
-    """Run the generator ``steps()`` in a window of the real Blender; see ``_WINDOW`` for what it has at hand."""
-    code = "import gi_addon\ngi_addon.register()\n" + steps + _WINDOW.replace("{patience}", "150")
-    answer = run(code, tmp_path, "--window", size, *options, timeout=timeout)
+def run_window(
+    steps: str, tmp_path: Path, *options: str, size: str = "1000x700", timeout: int = 600, profile: Path | None = None,
+    **environment,
+) -> dict:
+    """Run the generator ``steps()`` in a window of the real Blender; see ``_WINDOW`` for what it has at hand. With
+    ``profile`` only what is installed there, as in :func:`run`."""
+    opening = "" if profile else "import gi_addon\ngi_addon.register()\n"
+    code = opening + steps + _WINDOW.replace("{patience}", "150")
+    answer = run(code, tmp_path, "--window", size, *options, timeout=timeout, profile=profile, **environment)
     if "error" in answer:
         pytest.fail(answer["error"])
     return answer

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 import types
 
@@ -10,7 +11,8 @@ import numpy as np
 import pytest
 
 from gi_addon import presets
-from gi_addon.compare import exr, exr_plain, flip, scenes
+from gi_addon.compare import exr, exr_plain, flip, scenes, sheet
+from gi_addon.compare.page import number
 from gi_addon.effects import RESOURCES, source_of
 from gi_addon.engines import TECHNIQUES
 from gi_addon.settings import Settings, walk
@@ -28,6 +30,12 @@ class Layout:
 
     def label(self, text="", **_):
         self.texts.append(text)
+
+    def separator(self, **_):
+        pass
+
+    def operator_menu_enum(self, name, _property, **_):
+        self.operators.append(name)
 
     def operator(self, name, **_):
         self.operators.append(name)
@@ -93,12 +101,28 @@ def test_the_technique_panel_says_what_is_wrong(context):
     from gi_addon import ui
     from gi_addon.host import status
 
-    status.failed("there is no OpenGL on this machine")
+    status.failed("final", "there is no OpenGL on this machine")
     try:
         assert "there is no OpenGL on this machine" in " ".join(draw(ui.QUARTET_PT_technique, context).texts)
     finally:
-        status.resolved()
+        status.resolved("final")
     assert "no OpenGL" not in " ".join(draw(ui.QUARTET_PT_technique, context).texts)
+
+
+def test_a_viewport_that_goes_on_does_not_hide_why_a_render_failed():
+    """Each kind of picture has its own trouble; opening another file forgets all."""
+    from gi_addon.host import status
+
+    status.failed("final", "the camera has no lens")
+    status.failed("viewport", "the camera has no lens")
+    assert status.problem() == "the camera has no lens"
+    status.resolved("viewport")
+    assert status.problem() == "the camera has no lens"
+    status.resolved("final")
+    assert status.problem() == ""
+    status.failed("final", "out of memory")
+    status.forget()
+    assert status.problem() == "" and any("out of memory" in line for line in status.log_lines())
 
 
 @pytest.mark.blender
@@ -133,6 +157,55 @@ def test_standard_panels_work_for_the_engine(blender):
         "VIEWLAYER_PT_layer", "WORLD_PT_context_world", "RENDER_PT_frame_range",
     } <= names  # fmt: skip
     assert not {"VIEWLAYER_PT_layer_passes", "DATA_PT_light"} & names
+
+
+@pytest.mark.blender
+def test_everything_has_a_tooltip(blender):
+    """Every setting, every property of the panels and every operator of ours tells what it does."""
+    from gi_addon.host import properties
+
+    groups = [*properties._classes, *properties._window_class]
+    silent = [
+        f"{group.__name__}.{p.identifier}" for group in groups for p in group.bl_rna.properties
+        if p.type != "POINTER" and p.identifier not in ("name", "rna_type") and not p.description
+    ]  # fmt: skip
+    operators = [getattr(blender.ops.quartet, name).get_rna_type() for name in dir(blender.ops.quartet)]
+    silent += [operator.identifier for operator in operators if not operator.description]
+    assert len(groups) > 5 and len(operators) > 5 and not silent
+
+
+@pytest.mark.blender
+def test_the_operators_are_in_the_render_menu(blender, context):
+    """Where Blender's search finds them, for this engine only."""
+    from gi_addon import ui
+
+    assert ui._render_menu in blender.types.TOPBAR_MT_render.draw._draw_funcs
+    found = {}
+    for engine in ("QUARTET", "CYCLES"):
+        layout = Layout()
+        ui._render_menu(types.SimpleNamespace(layout=layout), types.SimpleNamespace(engine=engine))
+        found[engine] = layout.operators
+    assert found == {"QUARTET": ["quartet.compare", "quartet.open_page", "quartet.split_view", "quartet.preset"], "CYCLES": []}
+
+
+@pytest.mark.blender
+def test_the_users_presets_are_kept_and_applied(blender, context, tmp_path, monkeypatch):
+    """Blender's own preset menu: added by name, applied, removed."""
+    import bpy
+
+    def resource(kind, path="", create=False):
+        (tmp_path / path).mkdir(parents=True, exist_ok=True)
+        return str(tmp_path / path)
+
+    monkeypatch.setattr(bpy.utils, "user_resource", resource)
+    monkeypatch.setattr(bpy.utils, "is_path_extension", lambda path: False, raising=False)
+    settings = bpy.context.scene.quartet
+    settings.samples, settings.rsm.samples = 7, 77
+    assert bpy.ops.quartet.add_preset(name="Mine") == {"FINISHED"}
+    (path,) = tmp_path.rglob("*.py")
+    settings.samples, settings.rsm.samples = 1, 10
+    assert bpy.ops.script.execute_preset(filepath=str(path), menu_idname="QUARTET_MT_presets") == {"FINISHED"}
+    assert (settings.samples, settings.rsm.samples) == (7, 77)
 
 
 @pytest.mark.blender
@@ -173,11 +246,13 @@ def test_every_effect_names_its_source(technique):
 
 
 @pytest.mark.blender
-def test_compare_with_cycles_gives_numbers_and_pictures(context, gl, blender):
+def test_compare_with_cycles_gives_numbers_pictures_and_a_page(context, gl, blender, tmp_path, monkeypatch):
     """Another process renders both engines; the numbers are those of a lit box: direct light right within 5 % and far
-    better than a constant. Each view is an image of the right size."""
+    better than a constant. Each view is an image of the right size. The page holds scores, pictures, times and settings,
+    and fetches nothing."""
     from gi_addon.host import comparison
 
+    monkeypatch.setenv("QUARTET_CACHE", str(tmp_path))
     scene = context.scene
     scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 96, 54, 100
     scene.quartet.samples = 4
@@ -197,6 +272,44 @@ def test_compare_with_cycles_gives_numbers_and_pictures(context, gl, blender):
     image.pixels.foreach_get(shown)
     flips = outcome.pictures[window.compare_pass, "flip"]
     assert np.allclose(shown.reshape(27, 48, 4)[..., 0], flips, atol=1e-6)
+    assert outcome.page.parent == tmp_path / "reports"
+    text = outcome.page.read_text(encoding="utf-8")
+    for name, score in outcome.scores.items():
+        assert f"<td>{name}</td>" in text and number(score.rel_mse) in text
+    assert text.count("data:image/png;base64,") >= 4 * len(outcome.scores)
+    assert "<td class=text>samples</td><td class=text>4</td>" in text and "G-buffers Generation" in text and " ms</text>" in text
+    assert not re.search(r"""(src|href)=["']?(?!data:)\w""", text)
+
+
+@pytest.mark.blender
+def test_a_render_region_is_compared_alone(context, gl, blender, tmp_path, monkeypatch):
+    """A quarter of the picture: only its pixels count, black around them would thin every error out."""
+    from gi_addon.host import comparison
+
+    monkeypatch.setenv("QUARTET_CACHE", str(tmp_path))
+    render = context.scene.render
+    render.resolution_x, render.resolution_y, render.resolution_percentage = 96, 54, 100
+    render.use_border, render.use_crop_to_border = True, False
+    render.border_min_x, render.border_max_x, render.border_min_y, render.border_max_y = 0.25, 0.75, 0.5, 1.0
+    context.scene.quartet.samples = 1
+    window = blender.context.window_manager.quartet
+    window.reference, window.reference_samples, window.compare_percentage = "R1", 4, 100
+    assert blender.ops.quartet.compare() == {"FINISHED"}
+    reference = comparison.latest.pictures["Combined", "reference"]
+    assert reference.shape == (27, 48, 3)
+    assert 0.9 < comparison.latest.scores["Diffuse Direct"].gain < 1.1
+    assert (reference[:, [0, -1]].sum(axis=-1) > 0.0).mean() > 0.5
+    assert not render.use_crop_to_border
+
+
+def test_png_files_hold_every_pixel():
+    """Written by hand, read by an imaging library: the same bytes."""
+    import io
+
+    from PIL import Image
+
+    rgb = np.random.default_rng(3).integers(0, 256, (7, 13, 3), np.uint8)
+    assert np.array_equal(np.asarray(Image.open(io.BytesIO(sheet.png(rgb)))), rgb)
 
 
 @pytest.mark.blender

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import base64
 import html
-import io
 import json
 import math
 from collections.abc import Iterable, Sequence
@@ -14,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from .sheet import srgb
+from .sheet import png, srgb
 
 # What is drawn in the text's colour, dark or light: the page puts that in its place.
 INK = "#222"
@@ -92,19 +91,33 @@ def data_uri(linear: np.ndarray, *, scale: float = 1.0, enlarge: int = 1) -> str
 
 def bytes_uri(rgb: np.ndarray, *, enlarge: int = 1) -> str:
     """(H, W, 3) uint8, row 0 at the top, as a PNG in a data URI."""
-    from PIL import Image
-
-    image = Image.fromarray(np.ascontiguousarray(rgb))
-    if enlarge > 1:
-        image = image.resize((image.width * enlarge, image.height * enlarge), Image.Resampling.NEAREST)
-    stream = io.BytesIO()
-    image.save(stream, "PNG", optimize=True)
-    return "data:image/png;base64," + base64.b64encode(stream.getvalue()).decode()
+    data = png(np.repeat(np.repeat(rgb, enlarge, axis=0), enlarge, axis=1))
+    return "data:image/png;base64," + base64.b64encode(data).decode()
 
 
 def picture(uri: str, caption: str, width: int | None = None) -> str:
     size = f" width={width}" if width else ""
     return f'<figure><img src="{uri}" alt="{esc(caption)}"{size}><figcaption>{esc(caption)}</figcaption></figure>'
+
+
+def wall(index: int, size: Sequence[int], heat_map: str) -> str:
+    """An image wall's HTML: any two pictures of ``size`` (width, height), one wiped over the other. ``index`` is its place in
+    what :func:`wall_script` is given; ``heat_map`` is HTML that says what the heat maps show."""
+    width, height = size
+    return (
+        f'<div class=wall data-scene="{index}"><p>Pass <select class=pass></select> left <select class=left></select> '
+        f"right <select class=right></select> <label><input type=checkbox class=heat> error of the left picture as a heat map"
+        f'</label></p><div class=wipe style="aspect-ratio:{width}/{height}"><img class=base alt=right>'
+        f'<img class=top alt=left><div class=bar></div><span class="tag l"></span><span class="tag r"></span></div>'
+        f"<p class=quiet>Drag to wipe. Heat map: {heat_map}.</p></div>"
+    )
+
+
+def wall_script(walls: Sequence[dict[str, dict[str, dict[str, str]]]]) -> str:
+    """The script of a page's image walls. Per wall: pass -> name -> ``image`` and perhaps ``heat``, data URIs. The third
+    picture shows on the left at first, the first on the right."""
+    data = dump(list(walls)).replace("</", "<\\/")
+    return f"const WALLS = {data};\n{(_HERE / 'wall.js').read_text()}"
 
 
 # Anchors of the magma colour map (S. van der Walt and N. Smith, CC0), evenly spaced; linear between them.
@@ -128,8 +141,12 @@ _MAGMA = np.array(
 
 def heat(values: np.ndarray, low: float, high: float) -> np.ndarray:
     """A map (H, W) on a logarithmic scale as (H, W, 3) uint8, row order kept."""
-    t = (np.log10(np.maximum(values, 1e-12)) - math.log10(low)) / (math.log10(high) - math.log10(low))
-    t = np.clip(np.nan_to_num(t), 0.0, 1.0) * (len(_MAGMA) - 1)
+    return magma((np.log10(np.maximum(values, 1e-12)) - math.log10(low)) / (math.log10(high) - math.log10(low)))
+
+
+def magma(values: np.ndarray) -> np.ndarray:
+    """A map (H, W) of values from 0 to 1 in the colours of magma, (H, W, 3) uint8, row order kept."""
+    t = np.clip(np.nan_to_num(values), 0.0, 1.0) * (len(_MAGMA) - 1)
     i = np.minimum(t.astype(int), len(_MAGMA) - 2)
     f = (t - i)[..., None]
     return (_MAGMA[i] * (1 - f) + _MAGMA[i + 1] * f + 0.5).astype(np.uint8)

@@ -11,7 +11,7 @@ import numpy as np
 
 from . import charts
 from .metrics import error_map
-from .page import bytes_uri, chart, data_uri, document, dump, esc, heat, number, table
+from .page import bytes_uri, chart, data_uri, document, esc, heat, number, table, wall, wall_script
 from .references import Halves
 from .sheet import exposure
 from .study import COMPARED, Run
@@ -58,16 +58,12 @@ def _wall(index: int, scene: Measured) -> tuple[str, dict]:
             errors = error_map(test, reference.a[name], reference.b[name]).mean(axis=-1)
             label = f"{run.candidate.method}: {run.candidate.label} ({number(run.ms)} ms)"
             shown[label] = {"image": data_uri(test, scale=scale), "heat": bytes_uri(heat(errors[::-1], *_HEAT))}
-    width, height = scene.record["size"]
     bar = bytes_uri(np.repeat(heat(np.geomspace(*_HEAT, 256)[None], *_HEAT), 8, axis=0))
-    body = (
-        f'<div class=wall data-scene="{index}"><p>Pass <select class=pass></select> left <select class=left></select> '
-        f"right <select class=right></select> <label><input type=checkbox class=heat> error of the left picture as a heat map"
-        f'</label></p><div class=wipe style="aspect-ratio:{width}/{height}"><img class=base alt=right>'
-        f'<img class=top alt=left><div class=bar></div><span class="tag l"></span><span class="tag r"></span></div>'
-        f"<p class=quiet>Drag to wipe. Heat map: squared relative error against R∞, {_HEAT[0]:g} "
-        f'<img src="{bar}" width=200 height=10 alt="colour scale"> {_HEAT[1]:g}, logarithmic.</p></div>'
-    )
+    body = wall(
+        index, scene.record["size"],
+        f'squared relative error against R∞, {_HEAT[0]:g} <img src="{bar}" width=200 height=10 alt="colour scale"> '
+        f"{_HEAT[1]:g}, logarithmic",
+    )  # fmt: skip
     return body, pictures
 
 
@@ -149,7 +145,7 @@ def figures(scenes: list[Measured]) -> dict[str, object]:
 def _scene_html(index: int, scene: Measured, drawn: dict[str, object]) -> tuple[str, dict]:
     record = scene.record
     stem = Path(record["scene"]).stem.replace("builtin:", "")
-    wall, pictures = _wall(index, scene)
+    shown, pictures = _wall(index, scene)
     samples = record["reference_samples"]
     made = f"with {samples} samples each" if samples else "rendered elsewhere"
     made += "".join(f"; {method}: {version}" for method, version in record.get("peers", {}).items())
@@ -158,7 +154,7 @@ def _scene_html(index: int, scene: Measured, drawn: dict[str, object]) -> tuple[
         f"<p class=quiet>{record['size'][0]} × {record['size'][1]} pixels, {record['triangles']} triangles; Cycles references of "
         f"two halves {made}.</p>",
         "<ul>" + "".join(f"<li>{esc(line)}</li>" for line in verdict_lines(record)) + "</ul>",
-        wall,
+        shown,
         "<h3>Speed against accuracy</h3><p class=quiet>Bars are 95 % intervals, the step line is the Pareto front, its numbers "
         "those of the list above. Candidates with several bounces are left out where one bounce is the reference.</p>",
     ]
@@ -258,9 +254,7 @@ def write(
         f"fit: the gain column says so.</p><p class=quiet>{esc(head.get('calibration', ''))}</p>"
         f"<nav>{links}</nav>"
     )
-    data = dump(walls).replace("</", "<\\/")
-    script = f"const WALLS = {data};\n{(Path(__file__).parent / 'wall.js').read_text()}"
     path = folder / "report.html"
-    path.write_text(document("Quartet report", top + "".join(bodies) + extra, charts=True, scripts=script))
+    path.write_text(document("Quartet report", top + "".join(bodies) + extra, charts=True, scripts=wall_script(walls)))
     files, note = charts.write_images(drawn, folder / "charts") if images and drawn else ([], "")
     return [path, *files], [note] if note else []

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import struct
+import zlib
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -25,11 +27,25 @@ def exposure(reference: np.ndarray) -> float:
     return 1.0 / float(np.percentile(lit, 95)) if lit.size else 1.0
 
 
+def png(rgb: np.ndarray) -> bytes:
+    """(H, W, 3) uint8, row 0 at the top, as a PNG file's bytes. By hand: Blender ships no imaging library."""
+    height, width, _ = rgb.shape
+    rows = rgb.reshape(height, 3 * width)
+    # Filter 2 of the PNG specification: the difference to the row above, modulo 256.
+    up = np.diff(rows, axis=0, prepend=np.zeros((1, 3 * width), np.uint8))
+    lines = np.concatenate([np.full((height, 1), 2, np.uint8), up], axis=1)
+
+    def chunk(kind: bytes, data: bytes) -> bytes:
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
+    body = zlib.compress(lines.tobytes(), 9)
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", body) + chunk(b"IEND", b"")
+
+
 def write_png(path: str | Path, linear: np.ndarray) -> None:
     """Write (H, W, 3) linear values, row 0 at the bottom, as an sRGB PNG."""
-    from PIL import Image
-
-    Image.fromarray(srgb(linear[::-1, :, :3])).save(path)
+    Path(path).write_bytes(png(srgb(linear[::-1, :, :3])))
 
 
 def comparison(path: str | Path, rows: Sequence[tuple[str, np.ndarray, np.ndarray]], titles: Sequence[str]) -> None:

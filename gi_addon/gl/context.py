@@ -47,6 +47,8 @@ class GL:
         # A software driver draws from main memory and would rather be killed than say no; a GPU's driver says no.
         self.budget = int(0.75 * _physical_memory()) if self.software else None
         self.compiled = 0
+        # Textures' contents that depend on nothing, by the pass that made them: the next renderer need not.
+        self.kept: dict[str, list[bytes]] = {}
         # Bound whenever a framebuffer is about to go: moderngl returns to the last bound one by its name.
         self.idle = self.ctx.simple_framebuffer((1, 1))
 

@@ -2,8 +2,8 @@
 """*Compare with Cycles*: another Blender renders this file with both engines while this one stays free.
 
 The other process gets a copy of the file, renders Cycles twice (two halves of independent noise, see ``compare.metrics``)
-and Quartet once, and leaves pictures and scores in a folder. Here a timer watches it, shows the pictures in the Image Editor
-and the numbers in the panel.
+and Quartet once, and leaves pictures, scores and a page in a folder. Here a timer watches it, shows the pictures in the Image
+Editor and the numbers in the panel, and opens the page in the web browser.
 """
 
 from __future__ import annotations
@@ -17,17 +17,24 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import time
 import traceback
+import webbrowser
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import bpy
 import numpy as np
 
+from .. import __version__
 from ..compare import flip
+from ..compare.comparison_page import Side, page
 from ..compare.metrics import Score, score
-from ..compare.references import BOUNCES, SEEDS
+from ..compare.references import BOUNCES, SEEDS, cache_folder
 from ..compare.sheet import exposure
+from ..gl import shared
+from ..settings import Settings, walk
 from . import cycles, properties, status
 
 ROOT = __package__.rpartition(".")[0]
@@ -44,6 +51,7 @@ VIEWS = (
 IMAGE = "Quartet Comparison"
 _TICK = 0.25
 _BAR = 4  # width of the line between two halves, pixels
+_PAGE = "page.html"
 
 
 class ComparisonError(RuntimeError):
@@ -52,23 +60,28 @@ class ComparisonError(RuntimeError):
 
 @dataclass
 class Outcome:
-    """A finished comparison: pictures (H, W, 3) by pass and ``test``, ``reference`` or ``flip``, and scores."""
+    """A finished comparison: pictures (H, W, 3) by pass and ``test`` or ``reference``, (H, W) by pass and ``flip``, scores,
+    and the ``page`` that shows them: its HTML in the process that compares, its file in the one that asked."""
 
     title: str
     scores: dict[str, Score]
     pictures: dict[tuple[str, str], np.ndarray]
+    page: str | Path
 
     @staticmethod
-    def load(folder: Path) -> Outcome:
-        """Read what the other process has left."""
+    def load(folder: Path, kept: Path) -> Outcome:
+        """Read what the other process has left, and keep its page as ``kept``."""
         document = json.loads((folder / "result.json").read_text())
         with np.load(folder / "pictures.npz", allow_pickle=False) as data:
             pictures = {tuple(key.split("|")): data[key] for key in data.files}
-        return Outcome(document["title"], {n: Score(**values) for n, values in document["scores"].items()}, pictures)
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        shutil.move(folder / _PAGE, kept)
+        return Outcome(document["title"], {n: Score(**values) for n, values in document["scores"].items()}, pictures, kept)
 
     def save(self, folder: Path) -> None:
         """Leave it for the other process; ``result.json`` comes last."""
         np.savez(folder / "pictures.npz", **{"|".join(key): value for key, value in self.pictures.items()})
+        (folder / _PAGE).write_text(self.page, encoding="utf-8")
         scores = {name: asdict(s) for name, s in self.scores.items()}
         (folder / "result.json").write_text(json.dumps({"title": self.title, "scores": scores}))
 
@@ -95,6 +108,7 @@ class Running:
 
     process: subprocess.Popen
     folder: Path
+    name: str
     share: float = 0.0
     text: str = "Starting Blender"
 
@@ -140,7 +154,13 @@ def start(scene: bpy.types.Scene, reference: str, samples: int, percentage: int)
         command = [sys.executable, "-c", opening + call]
     with open(folder / "output.txt", "wb") as output:
         process = subprocess.Popen(command, stdout=output, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL)
-    return Running(process, folder)
+    name = Path(bpy.data.filepath).stem or "untitled"
+    return Running(process, folder, f"{name} {scene.quartet.technique} {time.strftime('%Y-%m-%d %H.%M.%S')}")
+
+
+def reports_folder() -> Path:
+    """Where the pages of comparisons are kept."""
+    return cache_folder() / "reports"
 
 
 def work(folder: str) -> None:
@@ -163,9 +183,12 @@ def _compare(folder: Path, scene: str, reference: str, samples: int, percentage:
     for window in bpy.context.window_manager.windows:
         window.scene = bscene
     render = bscene.render
+    # Of a region only what is in it: black around it would thin every error out.
+    render.use_crop_to_border = True
     render.resolution_percentage = max(1, render.resolution_percentage * percentage // 100)
     settings = properties.read(bscene)
     halves: list[dict[str, np.ndarray]] = []
+    seconds: dict[str, float] = {}
     stages = len(SEEDS) + 1
 
     def tell(stage: int, share: float, text: str) -> None:
@@ -179,33 +202,66 @@ def _compare(folder: Path, scene: str, reference: str, samples: int, percentage:
             done, total = map(int, found.groups())
             tell(len(halves), done / total, f"Cycles {len(halves) + 1} of 2, sample {done} of {total}")
 
+    def timed(engine: str) -> dict[str, np.ndarray]:
+        start = time.perf_counter()
+        passes = cycles.render_passes(bscene, COMPARED)
+        seconds[engine] = time.perf_counter() - start
+        return passes
+
     bpy.app.handlers.render_stats.append(stats)
     for seed in SEEDS.values():
         tell(len(halves), 0.0, f"Cycles, {len(halves) + 1} of 2")
         cycles.set_up(bscene, cycles.Reference(BOUNCES[reference], samples, seed))
-        halves.append(cycles.render_passes(bscene, COMPARED))
+        halves.append(timed(f"Cycles ({samples} samples)"))
     bpy.app.handlers.render_stats.remove(stats)
     tell(2, 0.0, "Quartet")
     render.engine = "QUARTET"
-    test = cycles.render_passes(bscene, COMPARED)
+    bpy.context.window_manager.quartet.measure = True
+    test = timed("Quartet")
+    if status.problem():
+        raise ComparisonError(f"Quartet rendered nothing: {status.problem()}")
     tell(2, 0.5, "Scores")
-    scores, pictures = {}, {}
-    for name in COMPARED:
-        if not all(name in p for p in (*halves, test)):
-            continue
-        a, b, t = (np.ascontiguousarray(p[name][..., :3], np.float32) for p in (*halves, test))
-        if a.max() <= 0.0 and t.max() <= 0.0:
-            continue
-        mean = (a + b) / 2.0
-        errors = flip.hdr_flip_map(t, mean).astype(np.float32)
-        values = asdict(score(t, a, b))
-        values.update(flip=float(errors.mean()), flip_p95=float(np.percentile(errors, 95)))
-        scores[name] = Score(**values)
-        pictures[name, "test"], pictures[name, "reference"], pictures[name, "flip"] = t, mean, errors
     height, width = test["Combined"].shape[:2]
     label = "R∞ (32 bounces)" if reference == "Rinf" else "R1 (one bounce)"
     title = f"{settings.technique}, {settings.samples} sub-frames, against {label}, 2 × {samples} samples, {width} × {height}"
-    return Outcome(title, scores, pictures)
+    scores, pictures = _judge(test, *halves)
+    text = page(title, settings.technique, scores, pictures, _side(settings, seconds))
+    return Outcome(title, scores, pictures, text)
+
+
+def _judge(test, a, b) -> tuple[dict[str, Score], dict[tuple[str, str], np.ndarray]]:
+    """Scores and pictures of every pass that all three renders have and that is not black in all."""
+    scores, pictures = {}, {}
+    for name in COMPARED:
+        if not all(name in passes for passes in (test, a, b)):
+            continue
+        t, half_a, half_b = (np.ascontiguousarray(p[name][..., :3], np.float32) for p in (test, a, b))
+        if half_a.max() <= 0.0 and t.max() <= 0.0:
+            continue
+        mean = (half_a + half_b) / 2.0
+        errors = flip.hdr_flip_map(t, mean).astype(np.float32)
+        values = asdict(score(t, half_a, half_b))
+        values.update(flip=float(errors.mean()), flip_p95=float(np.percentile(errors, 95)))
+        scores[name] = Score(**values)
+        pictures[name, "test"], pictures[name, "reference"], pictures[name, "flip"] = t, mean, errors
+    return scores, pictures
+
+
+def _side(settings: Settings, seconds: dict[str, float]) -> Side:
+    """What the page says of the frame that Quartet has just rendered."""
+    made = (
+        f"Quartet {__version__} in Blender {bpy.app.version_string}, {shared().driver}, {time.strftime('%Y-%m-%d %H:%M')}; "
+        f"references from unbiased Cycles on the processor."
+    )
+    changed = [
+        (path, f"{settings.get(path)}", f"{default}")
+        for path, default, _ in walk()
+        # Blender stores single precision.
+        if settings.get(path) != (float(np.float32(default)) if isinstance(default, float) else default)
+    ]
+    report = status.latest["final"]
+    passes = [(row.title, row.milliseconds, row.mib) for row in report.rows]
+    return Side(made, seconds, passes, report.skipped, changed, report.notes, report.approximated)
 
 
 # --- this process -----------------------------------------------------------------------------------------------------
@@ -261,6 +317,8 @@ class QUARTET_OT_compare(bpy.types.Operator):
         outcome = self._finish(context)
         if outcome == {"FINISHED"}:
             _image_editor(context)
+            if window.quartet.open_page:
+                _browse(latest.page, self.report)
         return outcome
 
     def _start(self, context) -> bool:
@@ -297,11 +355,35 @@ class QUARTET_OT_compare(bpy.types.Operator):
         _redraw(context)
 
 
+class QUARTET_OT_open_page(bpy.types.Operator):
+    """Open the page of the last comparison in the web browser: pictures to wipe, every error figure, times, settings"""
+
+    bl_idname = "quartet.open_page"
+    bl_label = "Open Comparison Page"
+
+    @classmethod
+    def poll(cls, context):
+        if latest is None:
+            cls.poll_message_set("Compare with Cycles first")
+        return latest is not None
+
+    def execute(self, context):
+        return {"FINISHED"} if _browse(latest.page, self.report) else {"CANCELLED"}
+
+
+def _browse(path: Path, report: Callable[[set[str], str], None]) -> bool:
+    """Show a page in the web browser; where there is none, say where the page lies."""
+    if path.is_file() and webbrowser.open(path.as_uri()):
+        return True
+    report({"WARNING"}, f"No web browser answered. The page is {path}" if path.is_file() else f"{path} is no longer there")
+    return False
+
+
 def collect(job: Running) -> Outcome:
     """The outcome of a job whose process has ended. Raises ComparisonError with its own last words."""
     folder = job.folder
     if (folder / "result.json").is_file():
-        return Outcome.load(folder)
+        return Outcome.load(folder, reports_folder() / f"{job.name}.html")
     why = folder / "error.txt"
     if why.is_file():
         raise ComparisonError(f"the comparison failed: {why.read_text()}")
@@ -376,12 +458,17 @@ def _redraw(context) -> None:
                 area.tag_redraw()
 
 
+_CLASSES = (QUARTET_OT_compare, QUARTET_OT_open_page)
+
+
 def register() -> None:
-    bpy.utils.register_class(QUARTET_OT_compare)
+    for cls in _CLASSES:
+        bpy.utils.register_class(cls)
 
 
 def unregister() -> None:
     global latest
     stop()
     latest = None
-    bpy.utils.unregister_class(QUARTET_OT_compare)
+    for cls in reversed(_CLASSES):
+        bpy.utils.unregister_class(cls)

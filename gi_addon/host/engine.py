@@ -149,7 +149,7 @@ class QuartetEngine(bpy.types.RenderEngine):
                 self._free()
 
     def _fail(self, message: str) -> None:
-        status.failed(message)
+        status.failed("final", message)
         self.error_set(f"Quartet: {message}")
         self.report({"ERROR"}, f"Quartet: {message}")
 
@@ -298,13 +298,20 @@ def standard_panels() -> list[type]:
     return out
 
 
+@bpy.app.handlers.persistent
+def _another_file(*_) -> None:
+    status.forget()
+
+
 def register() -> None:
     bpy.utils.register_class(QuartetEngine)
+    bpy.app.handlers.load_post.append(_another_file)
     for panel in standard_panels():
         panel.COMPAT_ENGINES.add("QUARTET")
 
 
 def unregister() -> None:
+    bpy.app.handlers.load_post.remove(_another_file)
     for panel in bpy.types.Panel.__subclasses__():
         engines = getattr(panel, "COMPAT_ENGINES", None)
         if engines and "QUARTET" in engines:

@@ -21,9 +21,9 @@ class QUARTET_OT_check_driver(bpy.types.Operator):
     def execute(self, context):
         try:
             self.report({"INFO"}, gl.driver())
-            status.resolved()
+            status.resolved("driver")
         except gl.GLError as error:
-            status.failed(str(error))
+            status.failed("driver", str(error))
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         return {"FINISHED"}
@@ -60,8 +60,8 @@ def draw(layout) -> None:
     row = layout.row()
     row.label(text=f"OpenGL driver: {gl.shared().driver or 'not started yet'}")
     row.operator(QUARTET_OT_check_driver.bl_idname)
-    if status.problem:
-        layout.label(text=status.problem, icon="ERROR")
+    if status.problem():
+        layout.label(text=status.problem(), icon="ERROR")
     box = layout.box()
     row = box.row()
     row.label(text="Log")

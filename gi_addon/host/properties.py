@@ -74,6 +74,7 @@ def _make_window() -> type:
     annotations = {
         "reference": bpy.props.EnumProperty(
             name="Reference", default="Rinf",
+            description="What Cycles renders to compare with",
             items=[("R1", "One Bounce", "What the paper's techniques approximate"),
                    ("Rinf", "All Bounces", "32 bounces: the truth")],
         ),
@@ -88,7 +89,13 @@ def _make_window() -> type:
         "compare_pass": bpy.props.EnumProperty(
             name="Pass", items=comparison.passes, update=_show, description="Pass of the comparison that is shown"
         ),
-        "compare_view": bpy.props.EnumProperty(name="View", items=comparison.VIEWS, update=_show),
+        "compare_view": bpy.props.EnumProperty(
+            name="View", items=comparison.VIEWS, update=_show, description="How the two pictures are shown together"
+        ),
+        "open_page": bpy.props.BoolProperty(
+            name="Open Page", default=True,
+            description="Open the comparison's page in the web browser when it is done",
+        ),
         "cancel_compare": bpy.props.BoolProperty(name="Cancel", description="Give the comparison up"),
         "measure": bpy.props.BoolProperty(
             name="Measure Passes", default=False,

@@ -45,9 +45,11 @@ class Report:
     approximated: tuple[tuple[str, str], ...] = ()  # (material, what of it)
 
 
-# The last frame of each kind, ``viewport`` and ``final``; why there is no picture, if there is none.
+# The last frame of each kind, ``viewport`` and ``final``, and why there is none of a kind. A viewport that goes on shows
+# nothing of why a final render failed, so each kind keeps its own.
 latest: dict[str, Report] = {}
-problem: str = ""
+problems: dict[str, str] = {}
+changes: int = 0  # goes up with whatever panels should show
 _log: deque[str] = deque(maxlen=_LOG_LINES)
 
 
@@ -65,7 +67,7 @@ def summarise(kind: str, renderer: Renderer, plan: Plan, scene: Scene, subframes
     return Report(
         kind, facts.settings.technique, facts.resolution, subframes, seconds, tuple(rows),
         tuple((task.title, reason) for task, reason in plan.skipped), plan.nbytes() / MIB,
-        tuple(dict.fromkeys([*scene.notes, *facts.rig.notes])),
+        tuple(dict.fromkeys(renderer.notes(scene))),
         tuple((material.name, text) for material, compiled in zip(scene.materials, renderer.gpu.compiled, strict=True)
               for text in compiled.approximated),
     )  # fmt: skip
@@ -73,26 +75,37 @@ def summarise(kind: str, renderer: Renderer, plan: Plan, scene: Scene, subframes
 
 def publish(report: Report) -> None:
     """Make ``report`` the one that panels show, and log its notes the first time they come up."""
-    old = latest.get(report.kind)
+    known = {note for old in latest.values() for note in old.notes}
     for note in report.notes:
-        if old is None or note not in old.notes:
+        if note not in known:
             log(note)
     latest[report.kind] = report
-    resolved()
+    resolved(report.kind)
+    _changed()
 
 
-def failed(message: str) -> None:
-    """Tell the panels and the log why there is no picture."""
-    global problem
-    if message != problem:
+def failed(kind: str, message: str) -> None:
+    """Tell the panels and the log why there is no picture of a kind."""
+    if message not in problems.values():
         log(message)
-    problem = message
+    problems[kind] = message
+    _changed()
 
 
-def resolved() -> None:
-    """There is a picture again."""
-    global problem
-    problem = ""
+def resolved(kind: str) -> None:
+    """There is a picture of this kind again."""
+    if problems.pop(kind, None) is not None:
+        _changed()
+
+
+def _changed() -> None:
+    global changes
+    changes += 1
+
+
+def problem() -> str:
+    """Why there is no picture; '' where there is one."""
+    return "; ".join(dict.fromkeys(problems.values()))
 
 
 def log(message: str) -> None:
@@ -105,8 +118,13 @@ def log_lines() -> list[str]:
     return list(_log)
 
 
+def forget() -> None:
+    """Forget the frames: another file has been opened."""
+    latest.clear()
+    problems.clear()
+
+
 def clear() -> None:
     """Forget everything: on unregister."""
-    latest.clear()
+    forget()
     _log.clear()
-    resolved()

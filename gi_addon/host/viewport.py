@@ -138,6 +138,8 @@ class Viewport:
         if self not in _live:
             return
         _live.discard(self)
+        if not _live:
+            status.resolved("viewport")
         self._token.cancel()
         self._texture = self._picture = self._request = self._scene = None
         self._sync.forget()
@@ -303,14 +305,14 @@ class Viewport:
 
     def _fail(self, message: str, key: tuple | None) -> None:
         self._failed = key
-        status.failed(message)
+        status.failed("viewport", message)
         engine = self._engine()
         if engine is not None:
             engine.update_stats("Quartet", message)
 
     def _tell(self) -> None:
         engine, request, shown = self._engine(), self._request, self._picture
-        if engine is None or request is None or status.problem:
+        if engine is None or request is None or "viewport" in status.problems:
             return
         done = shown.subframes if shown is not None and shown.request.key == request.key and shown.request.scale == 1 else 0
         total = request.settings.viewport_samples

@@ -9,7 +9,7 @@ from ..graph import Pass, Planned, Texture, Uniform
 
 # Roughness × cosine × curve. 16 a side is Cycles' own resolution; the last curve is Schlick's.
 _ALBEDO = (16, 16, 17)
-_ENERGY = (32, 32)
+_ENERGY = (32, 32)  # whole groups of 8 × 8
 
 
 class BRDFTables(Pass):
@@ -32,7 +32,14 @@ class BRDFTables(Pass):
         return None if facts.layered else "no material is glossy"
 
     def run(self, frame: Frame, planned: Planned) -> None:
+        textures = [frame.resources[write.name] for write in self.writes]
+        if self.title in frame.gl.kept:
+            for texture, data in zip(textures, frame.gl.kept[self.title], strict=True):
+                texture.write(data)
+            return
         program = frame.program(planned)
         for table, size in enumerate((_ALBEDO, (_ALBEDO[0], _ALBEDO[2]), _ENERGY)):
             frame.set(program, table=table)
             frame.compute(planned, program, size)
+        # Every viewport and every final render wants the same ones.
+        frame.gl.kept[self.title] = [texture.read() for texture in textures]

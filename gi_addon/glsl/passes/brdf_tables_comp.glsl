@@ -15,6 +15,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 const uint QUADRATURE = 256u;
 // Cosines of the average: midpoints of 16 strata.
 const int AVERAGE_STRATA = 16;
+shared float strata[8][AVERAGE_STRATA];
 
 float roughness_of(uint i, uint n) { return float(i) / float(n - 1u); }
 
@@ -70,14 +71,18 @@ void main()
         imageStore(brdf_average, ivec2(id.xy), vec4(sum / float(AVERAGE_STRATA)));
     } else {
         ivec2 size = imageSize(brdf_energy);
-        if (any(greaterThanEqual(ivec2(id.xy), size))) {
-            return;
-        }
+        // Whole groups: nobody may miss the barrier.
         float roughness = roughness_of(id.x, uint(size.x));
+        // The average is the same all along a column: its rows share the strata out.
+        for (int k = 0; k < AVERAGE_STRATA / 8; ++k) {
+            int i = 8 * k + int(gl_LocalInvocationID.y);
+            float cos_v = (float(i) + 0.5) / float(AVERAGE_STRATA);
+            strata[gl_LocalInvocationID.x][i] = 2.0 * cos_v * directional(roughness, cos_v, ETA_SCHLICK).y;
+        }
+        barrier();
         float average = 0.0;
         for (int i = 0; i < AVERAGE_STRATA; ++i) {
-            float cos_v = (float(i) + 0.5) / float(AVERAGE_STRATA);
-            average += 2.0 * cos_v * directional(roughness, cos_v, ETA_SCHLICK).y;
+            average += strata[gl_LocalInvocationID.x][i];
         }
         float e = directional(roughness, roughness_of(id.y, uint(size.y)), ETA_SCHLICK).y;
         imageStore(brdf_energy, ivec2(id.xy), vec4(e, average / float(AVERAGE_STRATA), 0.0, 0.0));
