@@ -41,7 +41,8 @@ class Facts:
     world_black: bool
     ao_distance: float
     world_visible: bool = True  # to the camera
-    medium: Medium | None = None  # that fills the world
+    medium: Medium | None = None  # that fills the world, or the box
+    medium_box: np.ndarray | None = None  # (2, 3) world space, m; None: everywhere
     margin: int = 0  # px drawn beyond each side of the picture
     stamps: dict[str, str] = field(default_factory=dict)
     emitters: Emitters = field(default_factory=Emitters.none)  # all of them, sampled as lights or not
@@ -113,6 +114,13 @@ def gather_facts(
         shadow_resolution=s.shadows.resolution, bounce_resolution=s.rsm.resolution,
         world_resolution=s.world.resolution,
     )  # fmt: skip
+    medium, medium_box = mean_medium(scene.world.graph, scene.images), None
+    domains = _domains(scene)
+    if medium is None and domains:
+        medium, medium_box = domains[0]
+    ignored = len(domains) - (medium_box is not None)
+    if ignored:
+        rig.notes.append(f"{ignored} of {len(domains)} volume objects are left out: one medium can fill the scene")
     return Facts(
         settings=s,
         resolution=(resolution[0] + 2 * margin, resolution[1] + 2 * margin),
@@ -133,7 +141,25 @@ def gather_facts(
         world_black=world is None or world.black,
         ao_distance=s.ao.distance or scene.world.ao_distance,
         world_visible=scene.world.visible_camera,
-        medium=mean_medium(scene.world.graph, scene.images),
+        medium=medium,
+        medium_box=medium_box,
         stamps=scene.stamps(),
         emitters=emitters,
     )
+
+
+def _domains(scene: Scene) -> list[tuple[Medium, np.ndarray]]:
+    """(medium, box in world space) of the objects that are a volume and nothing else, the largest first. A domain counts as
+    the box around it, which a cube along the axes is."""
+    found = []
+    inst = scene.instances
+    media = [mean_medium(m.graph, scene.images) if m.graph.surface is None else None for m in scene.materials]
+    for i in range(len(inst)):
+        medium = next((media[m] for m in inst.materials[i] if media[m] is not None), None)
+        if medium is None or scene.meshes[inst.mesh[i]].empty or not np.isfinite(inst.matrix[i]).all():
+            continue
+        low, high = scene.meshes[inst.mesh[i]].bounds
+        corners = np.array([[(low, high)[k >> axis & 1][axis] for axis in range(3)] for k in range(8)])
+        corners = corners @ inst.matrix[i, :3, :3].T + inst.matrix[i, :3, 3]
+        found.append((medium, np.stack([corners.min(axis=0), corners.max(axis=0)])))
+    return sorted(found, key=lambda d: -float(np.prod(d[1][1] - d[1][0])))

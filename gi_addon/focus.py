@@ -3,7 +3,7 @@
 
 A ground of a kilometre under a chair leaves one cell, or one texel of the sun's map, for the chair. Such a backdrop
 receives shadows and bounced light but needs no cells of its own far from everything else: what it does to the rest it does
-from near by (a floor at distance R of an object of height h sends it a share of order (h/R)² of what it sends in all).
+from near by. Of a plane at distance h, what lies farther than R from its nearest point has the view factor h²/(h² + R²).
 """
 
 from __future__ import annotations
@@ -16,8 +16,12 @@ from .scene import Scene
 
 # How many times larger than all the rest a backdrop is. Below, the region would hardly be smaller than the whole.
 _LARGER = 8.0
-# The region reaches this many diagonals of the rest beyond it: (h/R)² is then below 1/16 at the rest's own edge.
+# The region reaches this many diagonals of the rest beyond it, and this many times the distance from the rest's middle to the
+# nearest backdrop: view factor 1/26.
 _AROUND = 2.0
+_AROUND_DISTANCES = 5.0
+# What is not this much smaller than everything is not worth leaving anything out for.
+_WORTH = 0.5
 # What is hit along this many of the six axes from the rest's middle encloses it: a room, not a ground.
 _ENCLOSED = 4
 # An enclosure this many times larger (a sky's dome) is as good as infinitely far.
@@ -68,18 +72,43 @@ def find_focus(scene: Scene) -> Focus:
     if first == 0:
         return Focus.on(whole)
     core = np.stack([low[first], high[first]])
-    around = _AROUND * float(np.linalg.norm(core[1] - core[0]))
+    nearest = min(_distance(_corners(scene, i, core.mean(axis=0))) for i in order[:first])
+    around = max(_AROUND * float(np.linalg.norm(core[1] - core[0])), _AROUND_DISTANCES * nearest)
     region = np.stack([np.maximum(core[0] - around, whole[0]), np.minimum(core[1] + around, whole[1])])
-    return Focus(core, region, whole)
+    worth = np.linalg.norm(region[1] - region[0]) < _WORTH * np.linalg.norm(whole[1] - whole[0])
+    return Focus(core, region, whole) if worth else Focus.on(whole)
+
+
+def _corners(scene: Scene, instance: int, point: np.ndarray) -> np.ndarray:
+    """Triangle corners (T, 3, 3) of an instance, relative to ``point`` (3,) of the world."""
+    mesh, matrix = scene.meshes[scene.instances.mesh[instance]], scene.instances.matrix[instance]
+    return (mesh.positions.astype("f8") @ matrix[:3, :3].T + matrix[:3, 3] - point)[mesh.triangles]
+
+
+def _distance(corners: np.ndarray) -> float:
+    """Distance from the origin to the nearest of triangles (T, 3, 3)."""
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    nearest = []
+    for p, q in ((a, b), (b, c), (c, a)):
+        d = q - p
+        t = np.clip(-(p * d).sum(axis=1) / np.maximum((d * d).sum(axis=1), 1e-300), 0.0, 1.0)
+        nearest.append(np.linalg.norm(p + d * t[:, None], axis=1))
+    best = np.min(nearest, axis=0)
+    # The foot on the triangle's plane, where it lies within all three edges.
+    n = np.cross(b - a, c - a)
+    area2 = (n * n).sum(axis=1)
+    height = (a * n).sum(axis=1) / np.sqrt(np.maximum(area2, 1e-300))
+    within = area2 > 0.0
+    for p, q in ((a, b), (b, c), (c, a)):
+        within = within & ((np.cross(q - p, -p) * n).sum(axis=1) >= 0.0)
+    return float(np.where(within, np.minimum(np.abs(height), best), best).min(initial=np.inf))
 
 
 def _encloses(scene: Scene, instance: int, point: np.ndarray) -> bool:
     """Whether axis-parallel rays from ``point`` hit the instance in at least _ENCLOSED of the six directions."""
-    mesh = scene.meshes[scene.instances.mesh[instance]]
-    if len(mesh.triangles) > _MOST_TRIANGLES:
+    if len(scene.meshes[scene.instances.mesh[instance]].triangles) > _MOST_TRIANGLES:
         return True
-    matrix = scene.instances.matrix[instance]
-    corners = (mesh.positions.astype("f8") @ matrix[:3, :3].T + matrix[:3, 3] - point)[mesh.triangles]
+    corners = _corners(scene, instance, point)
     hits = 0
     for axis in range(3):
         u, v = (axis + 1) % 3, (axis + 2) % 3

@@ -56,11 +56,13 @@ LIGHT_VIEW = struct(
     ("light", "i4"), ("map", "i4"), ("_pad0", "u4"), ("_pad1", "u4"),
 )  # fmt: skip
 
-# A virtual point light: `flux` (W) reflected by a disc of `area` (m²) at `position_ws` facing `normal_ws`.
+# A virtual point light: `flux` (W) reflected by a disc of `area` (m²) at `position_ws` facing `normal_ws`. A point of the air
+# (`light` is VPL_AIR) scatters `flux` that goes along `normal_ws`, by the phase function's mean cosine `anisotropy`.
+VPL_AIR = -2
 VPL = struct(
     ("position_ws", "f4", 3), ("area", "f4"),
     ("normal_ws", "f4", 3), ("light", "i4"),  # that lit it, in rsm.lights; −1 another virtual light
-    ("flux", "f4", 3), ("_pad", "f4"),
+    ("flux", "f4", 3), ("anisotropy", "f4"),
 )  # fmt: skip
 
 
@@ -78,7 +80,7 @@ GENERATED = {
     + "\n"
     + _constants()
     + "\n",
-    "generated/vpl.glsl": glsl_struct("Vpl", VPL) + "\n",
+    "generated/vpl.glsl": glsl_struct("Vpl", VPL) + f"\nconst int VPL_AIR = {VPL_AIR};\n",
 }
 
 # Which of them declares a struct.

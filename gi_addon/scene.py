@@ -25,6 +25,11 @@ SNAPSHOT_VERSION = 1
 _uids = itertools.count(1)
 
 
+def new_uid() -> int:
+    """An identity that nothing else in this process has."""
+    return next(_uids)
+
+
 class SnapshotError(ValueError):
     """A snapshot file is missing, damaged, or of another version."""
 
@@ -61,6 +66,11 @@ class ShaderGraph:
     nodes: tuple[Node, ...] = ()
     surface: Link | None = None
     volume: Link | None = None
+
+    def reads(self, kind: str, output: str) -> bool:
+        """Whether a node reads ``output`` of one of ``kind``."""
+        links = (v for n in self.nodes for v in n.inputs.values() if isinstance(v, Link))
+        return any(v.output == output and self.nodes[v.node].kind == kind for v in links)
 
 
 # --- parts of a scene -------------------------------------------------------------------------------------------------
@@ -218,6 +228,8 @@ class World:
 CAMERA, DIFFUSE, GLOSSY, TRANSMISSION, VOLUME, SHADOW = (1 << i for i in range(6))
 ALL_RAYS = 63
 HOLDOUT = 64
+# Mesh attribute that the Geometry node's Pointiness reads.
+POINTINESS = ".pointiness"
 
 
 @dataclass(eq=False)

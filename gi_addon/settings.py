@@ -12,6 +12,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 _META = "quartet"
 
 
@@ -192,13 +194,8 @@ class SSDOSettings:
         higher="less noise", lower="faster",
     )  # fmt: skip
     steps: int = _setting(
-        32, "Steps", "How many of the samples lie along one ray, or on one side of one slice", low=2, high=256,
-        higher="finds thin and far things; fewer directions", lower="more directions; misses small things",
-    )  # fmt: skip
-    integrator: str = _setting(
-        "RAYS", "Integrator", "How directions are covered",
-        choices=(("RAYS", "Rays", "Cosine-distributed rays, each followed to its first hit"),
-                 ("BITMASK", "Visibility Bitmask", "Slices of the hemisphere in 32 sectors that samples fill")),
+        32, "Steps", "How many of the samples lie on one side of a slice of the hemisphere", low=2, high=256,
+        higher="finds thin and far things; fewer slices", lower="more slices; misses small things",
     )  # fmt: skip
     radius: float = _setting(
         0.0, "Radius", "How far away light is gathered from; 0 is everywhere on the screen", low=0.0, high=1e6,
@@ -389,6 +386,9 @@ def convert(path: str, value: Any, default: Any, meta: Meta) -> Any:
             value = float(value)
             if value != value:
                 raise ValueError
+            # Blender's numbers have 32 bits: its nearest to 0.99 is a little more, and meant to be 0.99.
+            ends = (end for end in (meta.low, meta.high) if end is not None and np.float32(end) == np.float32(value))
+            value = next(ends, value)
         else:
             value = str(value).upper() if meta.choices else str(value)
     except (TypeError, ValueError):

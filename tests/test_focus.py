@@ -9,7 +9,7 @@ from conftest import make
 
 from gi_addon.compare import scenes
 from gi_addon.engines import TECHNIQUES
-from gi_addon.focus import find_focus
+from gi_addon.focus import _distance, find_focus
 
 SUN = np.array([0.6, 0.0, -0.8])  # leans along x, so that shadows are ¾ of what throws them long
 
@@ -35,6 +35,15 @@ def test_a_huge_ground_is_no_part_of_the_region_but_a_room_is():
     b.quads(scenes.box_quads((-5.0, -5.0, 0.0), (5.0, 5.0, 4.0), inward=True), scenes.diffuse((0.5,) * 3))
     b.quads(scenes.box_quads((-0.1, -0.1, 1.0), (0.1, 0.1, 1.2)), scenes.diffuse((0.5,) * 3))
     assert not find_focus(b.build(scenes.perspective((0, -3, 1), (0, 0, 1), 1.0))).narrow
+    # A plate far off a small receiver is what lights it, not a backdrop.
+    assert not find_focus(scenes.two_patches(distance=1.0, size=0.5)).narrow
+
+
+def test_distances_to_triangles_are_to_their_insides_edges_and_corners():
+    plane = np.array([[[-1, -1, 2], [3, -1, 2], [-1, 3, 2]]], "f8")
+    assert _distance(plane) == pytest.approx(2.0)
+    assert _distance(plane + np.array([0, 2.0, 0])) == pytest.approx(np.sqrt(5.0))  # edge y = 1
+    assert _distance(plane + np.array([2.0, 2.0, 0])) == pytest.approx(np.sqrt(6.0))  # corner (1, 1)
 
 
 @pytest.mark.parametrize("technique", sorted(TECHNIQUES))

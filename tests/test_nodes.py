@@ -507,7 +507,7 @@ def test_a_sky_shines_as_in_cycles(blender, gl):
 
     bpy = blender
     models = [i.identifier for i in bpy.types.ShaderNodeTexSky.bl_rna.properties["sky_type"].enum_items]
-    for model in [m for m in models if m != "HOSEK_WILKIE"]:
+    for model in models:
         bpy.ops.wm.read_factory_settings(use_empty=True)
         scene = bpy.context.scene
         scene.world = bpy.data.worlds.new("W")
@@ -542,4 +542,6 @@ def test_a_sky_shines_as_in_cycles(blender, gl):
             pictures_to("sky", f"{model}-{name}", test=test[name], reference=reference[name])
             # A sub-frame lights by a few directions of the sky: eight of them have that noise.
             gain, error = (0.04, 0.02) if name == "Diffuse Direct" else (0.02, 0.003)
+            if model == "HOSEK_WILKIE":  # a fit
+                gain, error = 0.05, 0.02
             assert abs(s.gain - 1.0) < gain and s.rel_mse < error, f"{model} {name}: {s.text()}"

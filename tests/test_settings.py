@@ -83,6 +83,16 @@ def test_values_are_checked_and_say_what_is_wrong():
             s.set(path, value)
 
 
+def test_the_ends_of_a_range_survive_blenders_32_bits():
+    """0.99 comes from Blender as 0.9900000095 and must not stop a render."""
+    s = Settings()
+    for path, end in (("volume.anisotropy", 0.99), ("filter_width", 0.01), ("ssdo.thickness", 0.01)):
+        s.set(path, float(np.float32(end)))
+        assert s.get(path) == end
+    with pytest.raises(SettingError, match="outside"):
+        s.set("volume.anisotropy", 0.991)
+
+
 def test_a_copy_is_independent():
     a = Settings()
     b = a.copy()

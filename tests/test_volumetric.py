@@ -134,3 +134,29 @@ def test_shafts_are_as_bright_as_in_cycles(blender, gl, light):
         assert low < t.sum() / ((a + b) / 2).sum() < high, name
         if name == "Volume Direct":
             assert rel_mse(t, a, b) < 0.01
+
+
+def test_fog_lights_a_floor_out_of_the_lamps_sight(gl):
+    """A spot that shines level over a floor lights it by the fog alone: E = ∫ I σs e^(−σ(s + d)) p cosθ / d² dω ds, here by
+    quadrature over a cone of even intensity; the phase function is even, so p = 1/4π."""
+    density, height, power, half = 0.05, 1.0, 200.0, 0.2
+    b = scenes.SceneBuilder()
+    b.quads(np.array([[[-6, -6, 0], [6, -6, 0], [6, 6, 0], [-6, 6, 0]]], "f8"), scenes.diffuse((0.5,) * 3))
+    # The wall that the beam ends on reflects nothing.
+    b.quads(scenes.box_quads((3.0, -2, 0), (3.2, 2, 3)), scenes.diffuse((0.0,) * 3))
+    b.light(scenes.spot_light((-2.0, 0.0, height), (0.0, 0.0, height), power, size=2 * half, blend=0.0))
+    camera = scenes.orthographic((0.0, 0.0, 0.9), (0.0, 1e-4, 0.0), 0.4, aspect=16 / 9)
+    scene = b.build(camera, fog(density))
+    seen = make(scene, "Diffuse Indirect", samples=64, resolution=SIZE, use_ao=False).passes["Diffuse Indirect"]
+    mu = 1.0 - (1.0 - np.cos(half)) * (np.arange(24) + 0.5) / 24
+    phi = 2 * np.pi * (np.arange(32) + 0.5) / 32
+    s = 5.0 * (np.arange(1000) + 0.5) / 1000
+    mu, phi, s = np.meshgrid(mu, phi, s, indexing="ij")
+    r = np.sqrt(1.0 - mu**2)
+    p = np.stack([-2.0 + s * mu, s * r * np.cos(phi), height + s * r * np.sin(phi)], -1)
+    keep = (p[..., 0] < 3.0) & (p[..., 2] > 0.0)
+    d2 = (p**2).sum(axis=-1)
+    value = power / (4 * np.pi) * density * np.exp(-density * (s + np.sqrt(d2))) / (4 * np.pi) * p[..., 2] / d2**1.5
+    expected = (value * keep).mean() * 2 * np.pi * (1.0 - np.cos(half)) * 5.0
+    # The camera's own way through the fog dims light and colour alike.
+    assert seen[6:12, 10:22].mean() == pytest.approx(expected / np.pi, rel=0.05)

@@ -177,7 +177,7 @@ def test_averages_survive_thousands_of_writes_in_any_order(voxels):
 
     def run(order):
         parts = corners[order]
-        scene = _scene((triangles(parts[:2000]), first), (triangles(parts[2000:]), second), (triangles(frame), first))
+        scene = _scene((triangles(np.concatenate([parts[:2000], frame])), first), (triangles(parts[2000:]), second))
         return voxels(scene, 16)[1]
 
     out = run(np.arange(3000))

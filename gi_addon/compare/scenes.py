@@ -404,7 +404,7 @@ def effect(name: str) -> Scene:
         matrix = np.eye(4)
         matrix[:3, 3] = (-0.8, 0, 0.6)
         wax = principled("Wax", Base_Color=(0.8, 0.6, 0.4, 1.0), Subsurface_Weight=1.0, Subsurface_Radius=(0.5, 0.25, 0.12),
-                         Roughness=1.0)  # fmt: skip
+                         Subsurface_Scale=0.2, Roughness=1.0)  # fmt: skip
         b.add(sphere(0.6, 48, 24), wax, matrix)
         paper = Material("Paper", ShaderGraph((Node("BSDF_TRANSLUCENT", "Paper", {"Color": (0.8, 0.75, 0.6)}),), Link(0, "BSDF")))
         b.quads(np.array([[[0.3, 0, 0], [1.5, 0, 0], [1.5, 0, 1.4], [0.3, 0, 1.4]]]), paper)

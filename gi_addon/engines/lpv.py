@@ -35,12 +35,12 @@ from ..passes.screen import (
     _screen,
     no_gloss,
 )
+from ..passes.subsurface import Subsurface, SubsurfaceBack
 from ..passes.volumetric import MEDIUM_UNIFORMS, Volumetric, air, medium_defines, set_medium
 from ..passes.world_guide import WorldGuide
 from ..passes.world_rays import WorldRays
 from ..scene import SHADOW
 from ..settings import Settings
-from .rsm import Subsurface
 
 SH_COUNT = 9
 # Points of a cell's cross-section that the geometry is tested at, along each side: odd, so that one is in the middle, and
@@ -79,9 +79,10 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         IndirectLighting(),
         GlossyLighting(),
         Refraction(),
-        Subsurface(),
         WorldRays(),
         DirectLighting(),
+        SubsurfaceBack(),
+        Subsurface(),
         TranslucentLighting(),
         Volumetric(),
         Resolve(layers),

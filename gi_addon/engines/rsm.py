@@ -26,10 +26,10 @@ from ..passes.screen import (
     REFRACTING,
     TRANSMISSION_INDIRECT,
     ScreenPass,
-    _screen,
 )
+from ..passes.subsurface import Subsurface, SubsurfaceBack
 from ..passes.surface_points import SETS, SurfacePoints, points_per_subframe
-from ..passes.volumetric import MEDIUM_UNIFORMS, Volumetric, medium_defines, set_medium
+from ..passes.volumetric import MEDIUM_UNIFORMS, Volumetric, air, medium_defines, set_medium
 from ..passes.world_guide import WorldGuide
 from ..passes.world_rays import WorldRays
 from ..settings import Settings
@@ -56,9 +56,10 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         AOBlur(),
         InterpolatedIndirect(settings),
         IndirectLighting(settings),
-        Subsurface(),
         WorldRays(),
         DirectLighting(),
+        SubsurfaceBack(),
+        Subsurface(),
         TranslucentLighting(),
         GlossyReflections(),
         Refraction(),
@@ -80,8 +81,14 @@ def _gather_defines(facts: Facts, *, always: bool = False) -> dict[str, int]:
 
 
 def vpl_count(facts: Facts) -> int:
-    """Virtual point lights of all bounces."""
-    return facts.settings.rsm.samples + max(facts.settings.bounces - 1, 0) * points_per_subframe(facts)
+    """Virtual point lights of all bounces, and those in the air."""
+    return facts.settings.rsm.samples + max(facts.settings.bounces - 1, 0) * points_per_subframe(facts) + air_count(facts)
+
+
+def air_count(facts: Facts) -> int:
+    """Points of the air that scatter light onto surfaces: half as many as first-bounce lights, being smoother."""
+    found = air(facts)
+    return max(1, facts.settings.rsm.samples // 2) if found is not None and any(found.medium.scattering) else 0
 
 
 class RSMFlux(Pass):
@@ -148,17 +155,20 @@ class RSMSamplingPattern(Pass):
                vpl_count),
     )  # fmt: skip
     uniforms = (
-        Uniform("vpl_count", "int", "how many to draw; for the next bounce: where the last one's end"),
+        Uniform("vpl_count", "int", "how many to draw; for the next bounce and the air: where the last ones end"),
         Uniform("view_count", "int", "views in the list"),
         Uniform("levels", "int", "levels of the flux pyramid above the texels"),
         Uniform("bounce_first", "int", "the first light of the bounce before"),
         Uniform("point_first", "int", "the sub-frame's first surface point"),
         Uniform("point_count", "int", "surface points of a bounce"),
+        Uniform("medium_scattering", "vec3", "share of light scattered per metre"),
+        Uniform("medium_anisotropy", "float", "mean cosine of the scattering angle"),
         *MEDIUM_UNIFORMS,
         *CELL_UNIFORMS,
     )
     shaders = {
         "main": {"compute": "engines/rsm/vpls_comp.glsl"},
+        "air": {"compute": "engines/rsm/air_comp.glsl"},
         "bounce": {"compute": "engines/rsm/bounce_comp.glsl"},
     }
 
@@ -183,6 +193,23 @@ class RSMSamplingPattern(Pass):
         frame.compute(planned, program, (count,), (64,))
         if facts.settings.bounces > 1:
             self._more_bounces(frame, planned, count)
+        if air_count(facts):
+            self._air(frame, planned)
+
+    @staticmethod
+    def _air(frame: Frame, planned: Planned) -> None:
+        program, facts = frame.program(planned, "air"), planned.facts
+        medium, count = air(facts).medium, air_count(facts)
+        set_medium(frame, program, facts)
+        frame.set(
+            program,
+            point_count=count,
+            vpl_count=vpl_count(facts) - count,
+            view_count=len(facts.rig.bounce.sizes),
+            medium_scattering=tuple(float(v) for v in medium.scattering),
+            medium_anisotropy=float(medium.anisotropy),
+        )
+        frame.compute(planned, program, (count,), (64,))
 
     @staticmethod
     def _more_bounces(frame: Frame, planned: Planned, count: int) -> None:
@@ -315,29 +342,3 @@ class Refraction(ScreenPass):
 
     def prepare(self, frame: Frame, planned: Planned, program) -> None:
         _set_ray(frame, program, planned.facts)
-
-
-class Subsurface(ScreenPass):
-    """Light scattered below surfaces, from where it entered: the RSM's depth as a translucent shadow map."""
-
-    title = "RSM Subsurface Scattering"
-    reads = (
-        "rsm.depth", "rsm.normal", "rsm.albedo", "rsm.lights", "rsm.views", "gbuffer.depth", "gbuffer.diffuse",
-        "gbuffer.subsurface",
-    )  # fmt: skip
-    writes = (
-        Texture("direct.subsurface", "direct_subsurface", "radiance as direct.diffuse, of light that entered around the "
-                "point; share of the diffuse albedo it is for", "rgba32f", _screen),
-    )  # fmt: skip
-    uniforms = (*MEDIUM_UNIFORMS, Uniform("rsm_light_count", "int", "lights with reflective shadow maps"))
-    fragment = "engines/rsm/subsurface_frag.glsl"
-
-    def defines(self, facts: Facts) -> dict[str, int]:
-        return medium_defines(facts)
-
-    def absent(self, facts: Facts) -> str | None:
-        return None if facts.settings.use_translucency else "translucency is switched off"
-
-    def prepare(self, frame: Frame, planned: Planned, program) -> None:
-        set_medium(frame, program, planned.facts)
-        frame.set(program, rsm_light_count=len(planned.facts.rig.sources))

@@ -2,8 +2,8 @@
 """Screen-space directional occlusion, Figure 4d of the paper.
 
 T. Ritschel, T. Grosch and H.-P. Seidel, "Approximating Dynamic Global Illumination in Image Space", I3D 2009. What the
-camera sees is all the geometry there is: each pixel gathers the light that the other pixels reflect, along rays through the
-depth buffer or over slices with a visibility bitmask. What lies outside the picture, or behind something, sends nothing.
+camera sees is all the geometry there is: each pixel gathers the light that the other pixels reflect, over slices of its
+hemisphere with a visibility bitmask. What lies outside the picture, or behind something, sends nothing.
 """
 
 from __future__ import annotations
@@ -136,8 +136,8 @@ class _Gather(ScreenPass):
     """Light from the screen: ``sent`` is the radiance that pixels send, or their emission, which comes with the world's light."""
 
     uniforms = (
-        Uniform("ssdo_directions", "int", "directions (rays) or slices (bitmask) per pixel"),
-        Uniform("ssdo_steps", "int", "depth tests along each ray, or each side of a slice"),
+        Uniform("ssdo_slices", "int", "slices per pixel"),
+        Uniform("ssdo_steps", "int", "depth tests along each of a slice's two sides"),
         Uniform("ssdo_radius", "float", "how far light is gathered from, world units; 0 = everywhere"),
         Uniform("ssdo_thickness", "float", "thickness of what the screen shows, as a share of its distance from the receiver"),
     )
@@ -161,17 +161,15 @@ class _Gather(ScreenPass):
             "SENT": _SENT["SENT_EMISSION" if emits else "SENT_NOTHING" if self.from_sources else "SENT_BOUNCE"],
             "GATHER_WORLD": int(self.from_sources and not facts.world_black),
             "GATHER_SCALE": facts.settings.gather_scale,
-            "SSDO_RAYS": int(facts.settings.ssdo.integrator == "RAYS"),
         }
 
     def run(self, frame: Frame, planned: Planned) -> None:
         settings = planned.facts.settings.ssdo
-        per_direction = settings.steps * (1 if settings.integrator == "RAYS" else 2)
         with _world(frame, planned, bool(self.defines(planned.facts)["GATHER_WORLD"])) as virtual:
             program = frame.program(planned, virtual=virtual)
             frame.set(
                 program,
-                ssdo_directions=max(1, settings.samples // per_direction),
+                ssdo_slices=max(1, settings.samples // (2 * settings.steps)),
                 ssdo_steps=settings.steps,
                 ssdo_radius=settings.radius,
                 ssdo_thickness=settings.thickness,
@@ -180,7 +178,7 @@ class _Gather(ScreenPass):
 
 
 class InterpolatedIndirect(_Gather):
-    """Light from the screen at one pixel per block."""
+    """Light from the screen at one pixel per block. Blocks of one pixel too share their directions with their neighbours."""
 
     figure = "SSDO Interpolated Indirect Lighting Computation"
     fragment = "engines/ssdo/gather_low_frag.glsl"
@@ -190,9 +188,6 @@ class InterpolatedIndirect(_Gather):
         self.title = f"{_title(sent)} (low resolution)"
         self.reads = ("ssdo.planes", _read(sent), "gbuffer.low_depth", "gbuffer.low_normal", "gbuffer.low_pixel")
         self.writes = raw_gather(low)
-
-    def absent(self, facts: Facts) -> str | None:
-        return super().absent(facts) or (None if facts.settings.gather_scale > 1 else "every pixel gathers for itself")
 
 
 class IndirectLighting(_Gather):
@@ -221,7 +216,7 @@ def _title(sent: str) -> str:
 
 
 def _smoothing(sent: str, low: str) -> BlockSmoothing:
-    return BlockSmoothing(low, f"{_title(sent)} (smoothing)", "Gaussian Blur")
+    return BlockSmoothing(low, f"{_title(sent)} (smoothing)", "Gaussian Blur", in_pairs=True)
 
 
 def _read(sent: str) -> str | Optional:

@@ -28,12 +28,12 @@ from ..passes.screen import (
     no_gloss,
 )
 from ..passes.smoothing import BlockSmoothing, raw_gather
+from ..passes.subsurface import Subsurface, SubsurfaceBack
 from ..passes.volumetric import MEDIUM_UNIFORMS, Volumetric, medium_defines, set_medium
 from ..passes.voxels import GRID_UNIFORMS, VoxelGrid, Voxelisation, voxel_grid
 from ..passes.world_guide import WorldGuide
 from ..passes.world_rays import WorldRays
 from ..settings import Settings
-from .rsm import Subsurface
 
 
 def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
@@ -59,9 +59,10 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         IndirectLighting(),
         GlossyCones(),
         *([ShadowCones()] if settings.vct.shadow_cones else []),
-        Subsurface(),
         WorldRays(),
         DirectLighting(),
+        SubsurfaceBack(),
+        Subsurface(),
         TranslucentLighting(),
         RefractionCones(),
         VoxelVolumetric(),

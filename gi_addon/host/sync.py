@@ -8,7 +8,7 @@ past the loop. Meshes, materials and images that did not change since the last s
 from __future__ import annotations
 
 import math
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import bpy
 import numpy as np
@@ -20,6 +20,7 @@ from ..scene import (
     DIFFUSE,
     GLOSSY,
     HOLDOUT,
+    POINTINESS,
     SHADOW,
     TRANSMISSION,
     VOLUME,
@@ -31,8 +32,9 @@ from ..scene import (
     Mesh,
     Scene,
     World,
+    new_uid,
 )
-from . import strands
+from . import attributes, strands
 from .compat import uses_nodes
 from .materials import ImageTable, default_material, holdout_material, read_light, read_material, read_world, world_sun
 
@@ -58,7 +60,7 @@ class SceneSync:
         self._default = default_material()
         self._ball: Mesh | None = None
         self._hairs: dict[tuple, list[tuple[Mesh, int]]] = {}
-        self._holdouts: dict[int, tuple[Material, Material]] = {}
+        self._variants: dict[tuple, tuple[Material, Material]] = {}
         self.counts: dict[str, int] = {}
 
     def forget(self) -> None:
@@ -108,7 +110,7 @@ class SceneSync:
         scene = Scene(name=source.name, frame=source.frame_current)
         images = ImageTable(self._images, scene.notes)
         layer = depsgraph.view_layer
-        materials = _MaterialIndex(self, images, scene, layer.material_override)
+        materials = _MaterialIndex(self, images, scene, depsgraph)
         placed = _Placed()
         meshes: dict[tuple, int] = {}
         by_pointer: dict[int, int] = {}
@@ -136,13 +138,13 @@ class SceneSync:
             if not np.isfinite(matrix).all():
                 _note(scene, f"object {obj.name} is left out: its transform is not a number")
                 continue
-            index = self._mesh_index(obj, scene, meshes, by_pointer, used_keys)
+            slots = [slot.material for slot in obj.material_slots] or list(getattr(obj.data, "materials", [])) or [None]
+            pointy = any(materials.asks(m)[1] for m in slots)
+            index = self._mesh_index(obj, scene, meshes, by_pointer, used_keys, pointy)
             if index is None:
                 continue
-            slots = [slot.material for slot in obj.material_slots] or list(getattr(obj.data, "materials", []))
             visibility = _visibility(obj, depsgraph.view_layer)
-            held = bool(visibility & HOLDOUT)
-            placed.add(index, matrix, tuple(materials.index(m, held) for m in slots) or (materials.index(None, held),),
+            placed.add(index, matrix, tuple(materials.placed(m, instance, obj, bool(visibility & HOLDOUT)) for m in slots),
                        visibility, _random(instance, obj), obj.pass_index, tuple(obj.color))  # fmt: skip
         self._meshes = {k: v for k, v in self._meshes.items() if k in used_keys}
         scene.instances = placed.instances()
@@ -206,20 +208,20 @@ class SceneSync:
 
     # -- meshes --------------------------------------------------------------------------------------------------
 
-    def _mesh_index(self, obj, scene: Scene, meshes, by_pointer, used_keys) -> int | None:
-        """Index of the object's evaluated mesh among the scene's; None if it has no triangles."""
+    def _mesh_index(self, obj, scene: Scene, meshes, by_pointer, used_keys, pointy: bool) -> int | None:
+        """Index of the object's evaluated mesh among the scene's, ``pointy`` with pointiness; None if it has no triangles."""
         data = obj.data
-        pointer = data.as_pointer() if data is not None else 0
+        pointer = (data.as_pointer() if data is not None else 0, pointy)
         if obj.type == "MESH" and pointer in by_pointer:
             return by_pointer[pointer]
         # One object can bring several meshes (Geometry Nodes instances): the data's name tells them apart.
-        key = (obj.original.session_uid, data.name_full if data is not None else "", obj.type)
+        key = (obj.original.session_uid, data.name_full if data is not None else "", obj.type, pointy)
         if key in meshes and obj.type != "MESH":
             return meshes[key]
         mesh = self._meshes.get(key)
         if mesh is None:
             try:
-                mesh = _read_object_mesh(obj, scene)
+                mesh = _read_object_mesh(obj, scene, pointy)
             except Exception as error:  # one damaged mesh must not cost the picture
                 _note(scene, f"object {obj.name} is left out: its mesh can't be read ({type(error).__name__}: {error})")
                 return None
@@ -240,29 +242,55 @@ class SceneSync:
 
 
 class _MaterialIndex:
-    """Indices of Blender's materials in the scene's list, filled as they are met. ``override`` is what the view layer
-    puts on every surface, if anything."""
+    """Indices of Blender's materials in the scene's list, filled as they are met. A variant is a material of its own, but
+    has the program of the one it comes from where only numbers differ. The view layer may put one on every surface."""
 
-    def __init__(self, sync: SceneSync, images: ImageTable, scene: Scene, override: bpy.types.Material | None) -> None:
-        self.sync, self.images, self.scene, self.override = sync, images, scene, override
-        self._index: dict[tuple[int, bool], int] = {}
+    def __init__(self, sync: SceneSync, images: ImageTable, scene: Scene, depsgraph: bpy.types.Depsgraph) -> None:
+        self.sync, self.images, self.scene, self.depsgraph = sync, images, scene, depsgraph
+        self.override = depsgraph.view_layer.material_override
+        self._index: dict[tuple, int] = {}
+        self._read: dict[int, Material] = {}
+        self._asked: dict[int, tuple] = {}
 
-    def index(self, material: bpy.types.Material | None, held: bool = False) -> int:
-        """Index of a material; ``held``: of its variant that the camera sees as a hole."""
+    def index(self, material: bpy.types.Material | None) -> int:
+        """Index of a material, attributes of objects being 0."""
+        return self._variant(self.override or material, False, ())
+
+    def placed(self, material: bpy.types.Material | None, instance, obj: bpy.types.Object, held: bool) -> int:
+        """Index of a material as ``obj`` wears it; ``held``: of its variant that the camera sees as a hole."""
         material = self.override or material
-        key = material.original.session_uid if material is not None else 0
-        if (key, held) not in self._index:
-            found = self._get(material, key)
-            if held:
-                old = self.sync._holdouts.get(key)
-                if old is None or old[0] is not found:
-                    old = self.sync._holdouts[key] = (found, holdout_material(found))
-                found = old[1]
-            self._index[key, held] = len(self.scene.materials)
-            self.scene.materials.append(found)
-        return self._index[key, held]
+        names, _ = self.asks(material)
+        return self._variant(material, held, attributes.values_of(names, instance, obj, self.depsgraph) if names else ())
 
-    def _get(self, material, key: int) -> Material:
+    def asks(self, material: bpy.types.Material | None) -> tuple[tuple[attributes.Name, ...], bool]:
+        """What a material wants to know of the object that wears it: attributes, and whether pointiness."""
+        material = self.override or material
+        key = _uid(material)
+        if key not in self._asked:
+            graph = self._get(material).graph
+            self._asked[key] = (attributes.asked_of_objects(graph), graph.reads("NEW_GEOMETRY", "Pointiness"))
+        return self._asked[key]
+
+    def _variant(self, material, held: bool, values: tuple) -> int:
+        key = (_uid(material), held, values)
+        if key not in self._index:
+            found = self._get(material)
+            if held or values:
+                old = self.sync._variants.get(key)
+                if old is None or old[0] is not found:
+                    old = self.sync._variants[key] = (found, _made_variant(found, held, values))
+                found = old[1]
+            self._index[key] = len(self.scene.materials)
+            self.scene.materials.append(found)
+        return self._index[key]
+
+    def _get(self, material) -> Material:
+        key = _uid(material)
+        if key not in self._read:
+            self._read[key] = self._fetch(material, key)
+        return self._read[key]
+
+    def _fetch(self, material, key: int) -> Material:
         if material is None:
             return self.sync._default
         # Graphs refer to images by index, so a kept material is good only while its images keep theirs; reading a
@@ -282,6 +310,16 @@ class _MaterialIndex:
 
     def _same_images(self, material: Material, key: int) -> bool:
         return self._images_of(material) == self.sync._material_images.get(key)
+
+
+def _uid(material: bpy.types.Material | None) -> int:
+    return material.original.session_uid if material is not None else 0
+
+
+def _made_variant(material: Material, held: bool, values: tuple) -> Material:
+    if values:
+        material = replace(material, graph=attributes.with_values(material.graph, values), uid=new_uid())
+    return holdout_material(material) if held else material
 
 
 class _Placed:
@@ -366,11 +404,11 @@ def _visibility(obj: bpy.types.Object, layer: bpy.types.ViewLayer) -> int:
     return bits & (ALL_RAYS | HOLDOUT)
 
 
-def _read_object_mesh(obj: bpy.types.Object, scene: Scene) -> Mesh | None:
-    """The evaluated mesh of an object, whatever it is made from."""
+def _read_object_mesh(obj: bpy.types.Object, scene: Scene, pointy: bool) -> Mesh | None:
+    """The evaluated mesh of an object, whatever it is made from; ``pointy`` with pointiness."""
     # In edit mode the evaluated mesh is still the editor's, without arrays: to_mesh() makes them.
     if obj.type == "MESH" and obj.mode != "EDIT":
-        return read_mesh(obj.data, obj.name)
+        return read_mesh(obj.data, obj.name, pointy)
     if obj.type == "CURVES":
         return strands.curves_mesh(obj)
     try:
@@ -381,7 +419,7 @@ def _read_object_mesh(obj: bpy.types.Object, scene: Scene) -> Mesh | None:
     if mesh is None:
         return None
     try:
-        return read_mesh(mesh, obj.name)
+        return read_mesh(mesh, obj.name, pointy)
     finally:
         obj.to_mesh_clear()
 
@@ -392,15 +430,15 @@ def _get(attribute, kind: str, dtype: str, width: int) -> np.ndarray:
     return out.reshape(-1, width) if width > 1 else out
 
 
-def read_mesh(mesh: bpy.types.Mesh, name: str) -> Mesh:
-    """Triangles with split vertices from a Blender mesh, by the bulk accessors with matching types."""
+def read_mesh(mesh: bpy.types.Mesh, name: str, pointy: bool = False) -> Mesh:
+    """Triangles with split vertices from a Blender mesh, by the bulk accessors with matching types; ``pointy`` with
+    pointiness as an attribute."""
     triangle_count = len(mesh.loop_triangles)
     if triangle_count == 0 and len(mesh.polygons):
         mesh.calc_loop_triangles()
         triangle_count = len(mesh.loop_triangles)
     if triangle_count == 0:
         return Mesh(name, np.zeros((0, 3), "f4"), np.zeros((0, 3), "f4"), np.zeros((0, 3), "u4"), np.zeros((0, 3), "i8"))
-    attributes = mesh.attributes
     positions = _positions(mesh)
     corner_vertex = _corner_vertices(mesh)
     triangles = np.empty(triangle_count * 3, np.uint32)
@@ -412,10 +450,10 @@ def read_mesh(mesh: bpy.types.Mesh, name: str) -> Mesh:
 
     corner: dict[str, np.ndarray] = {}
     for layer in mesh.uv_layers:
-        attribute = attributes.get(layer.name)
+        attribute = mesh.attributes.get(layer.name)
         if attribute is not None and attribute.domain == "CORNER":
             corner[f"uv:{layer.name}"] = _get(attribute, "vector", "f4", 2)
-    for attribute in attributes:
+    for attribute in mesh.attributes:
         if attribute.name.startswith(".") or attribute.name == "position" or attribute.name in mesh.uv_layers:
             continue
         values = _read_attribute(attribute)
@@ -434,6 +472,8 @@ def read_mesh(mesh: bpy.types.Mesh, name: str) -> Mesh:
         color = attribute.data_type in ("FLOAT_COLOR", "BYTE_COLOR")
         corner[f"{'color' if color else 'attr'}:{attribute.name}"] = values
 
+    if pointy:
+        corner[f"attr:{POINTINESS}"] = np.repeat(attributes.pointiness(mesh)[corner_vertex][:, None], 3, axis=1)
     positions, normals, corner, triangles = _weld(positions, corner_vertex, normals, corner, triangles)
     slots, triangles = _by_material(mesh, triangles, triangle_count)
     render_uv = next((layer.name for layer in mesh.uv_layers if layer.active_render), "")

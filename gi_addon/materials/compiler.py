@@ -224,7 +224,12 @@ class Compiler:
 def compile_surface(graph: ShaderGraph, images: Sequence[Image] = ()) -> CompiledGraph:
     """Compile a material's surface to ``Closure surface_closure(SurfacePoint point)``; ``images`` are the scene's."""
     c = Compiler(graph, images)
-    value = c.convert(c.output(graph.surface), CLOSURE) if graph.surface else Value(CLOSURE, "closure_none()")
+    value = Value(CLOSURE, "closure_none()")
+    if graph.surface is not None:
+        value = c.convert(c.output(graph.surface), CLOSURE)
+    elif graph.volume is not None:  # the hull of a volume is not seen
+        value = Value(CLOSURE, "closure_transparent(vec3(1.0))")
+        c.result.transparent = True
     body = "\n".join(f"    {line}" for line in c.lines)
     c.result.glsl = f"Closure surface_closure(SurfacePoint point) {{\n{body}\n    return {value.text};\n}}\n"
     return c.result

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ..scene import Node
+from ..scene import POINTINESS, Node
 from .compiler import CLOSURE, COLOR, FLOAT, VECTOR, Compiler, Value
 from .means import BINARY
 from .spectrum import sheen_table
@@ -30,7 +30,6 @@ def node(*kinds: str):
 
 # Outputs that exist but are not what Cycles computes.
 INEXACT = {
-    ("NEW_GEOMETRY", "Pointiness"): "Pointiness is ½",
     ("NEW_GEOMETRY", "Random Per Island"): "Random Per Island is ½",
     ("NEW_GEOMETRY", "Parametric"): "Parametric is 0",
     ("HAIR_INFO", "Length"): "Length is 0",
@@ -121,7 +120,8 @@ def principled(c: Compiler, n: Node) -> dict[str, Value]:
         r.subsurface = True
         radius = c.input(n, "Subsurface Radius", VECTOR, (1.0, 0.2, 0.1))
         scale = c.input(n, "Subsurface Scale", FLOAT, 0.05)
-        c.statement(f"principled_subsurface({out}, {subsurface.text}, {radius.text} * {scale.text});")
+        c.statement(f"principled_subsurface({out}, {base.text}, {subsurface.text}, {radius.text} * {scale.text}, "
+                    f"{roughness.text}, principled_ior({ior.text}, {level.text}));")  # fmt: skip
     coat = c.input(n, "Coat Weight", FLOAT, 0.0)
     emission = c.input(n, "Emission Color", COLOR, (1.0, 1.0, 1.0))
     strength = c.input(n, "Emission Strength", FLOAT, 0.0)
@@ -266,8 +266,11 @@ def subsurface_scattering(c: Compiler, n: Node) -> dict[str, Value]:
     color = c.input(n, "Color", COLOR, (0.8, 0.8, 0.8))
     radius = c.input(n, "Radius", VECTOR, (1.0, 0.2, 0.1))
     scale = c.input(n, "Scale", FLOAT, 0.05)
+    roughness = c.input(n, "Roughness", FLOAT, 1.0)
+    ior = c.input(n, "IOR", FLOAT, 1.4)
     closure = c.variable(CLOSURE, f"closure_diffuse({color.text}, {_normal(c, n)})")
-    c.statement(f"principled_subsurface({closure.text}, 1.0, {radius.text} * {scale.text});")
+    c.statement(f"principled_subsurface({closure.text}, {color.text}, 1.0, {radius.text} * {scale.text}, "
+                f"{roughness.text}, {ior.text});")  # fmt: skip
     return {"BSSRDF": closure}
 
 
@@ -345,12 +348,15 @@ def uv_map(c: Compiler, n: Node) -> dict[str, Value]:
 
 @node("ATTRIBUTE")
 def attribute(c: Compiler, n: Node) -> dict[str, Value]:
-    """A mesh attribute by name; object and instancer attributes are 0."""
+    """A mesh attribute by name. Those of objects, instancers and view layers are numbers, which ``value`` (4,) holds."""
     name = n.params.get("attribute_name", "")
     if n.params.get("attribute_type", "GEOMETRY") != "GEOMETRY":
-        c.approximate(n, "object, instancer and view-layer attributes are 0")
-        zero = c.constant(0.0, COLOR)
-        return {"Color": zero, "Vector": zero, "Fac": c.constant(0.0, FLOAT), "Alpha": c.constant(0.0, FLOAT)}
+        *rgb, alpha = n.params.get("value", (0.0, 0.0, 0.0, 0.0))
+        color = c.constant(tuple(rgb), COLOR)
+        return {
+            "Color": color, "Vector": c.constant(tuple(rgb), VECTOR), "Fac": c.constant(sum(rgb) / 3.0, FLOAT),
+            "Alpha": c.constant(alpha, FLOAT),
+        }  # fmt: skip
     v = c.attribute(f"attr:{name}")
     return _attribute(v)
 
@@ -379,7 +385,7 @@ def geometry(c: Compiler, n: Node) -> dict[str, Value]:
         "Incoming": Value(VECTOR, "point.view_ws"),
         "Parametric": Value(VECTOR, "vec3(0.0)"),
         "Backfacing": Value(FLOAT, "point.backfacing"),
-        "Pointiness": Value(FLOAT, "0.5"),
+        "Pointiness": Value(FLOAT, f"{c.attribute(f'attr:{POINTINESS}')}.x" if c.used(n, "Pointiness") else "0.5"),
         "Random Per Island": Value(FLOAT, "0.5"),
     }
 

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from .hosek import HOSEK_SLANT, hosek_neighbours
 from .spectrum import OBSERVER, REC709_FROM_XYZ
 
 SIZE = (256, 128)  # of the image; half of the azimuths are computed, the sky is symmetric about its sun
@@ -32,8 +33,7 @@ class Sky:
 
 
 def sky(params: Mapping[str, Any]) -> Sky | None:
-    """The sky of a TEX_SKY node's settings; None for a model that is not known. Hosek's and Wilkie's is taken for
-    the multiple scattering one, at its brightness."""
+    """The sky of a TEX_SKY node's settings; None for a model that is not known."""
     kind = params.get("sky_type", "MULTIPLE_SCATTERING")
     elevation, _ = sun_angles(params)
     dust = params.get("aerosol_density", params.get("dust_density", 1.0))
@@ -42,12 +42,7 @@ def sky(params: Mapping[str, Any]) -> Sky | None:
     if kind == "PREETHAM":
         return preetham(elevation, turbidity)
     if kind == "HOSEK_WILKIE":
-        # Turbidity 1 is air alone, 2.2 a clear day: dust of density 1.
-        found = _Multiple(0.0, 1.0, max(turbidity - 1.0, 0.0) / 1.2, 1.0).sky(elevation, 0.01)
-        pixels = (found.pixels * (*(_HOSEK_UNIT,) * 3, 1.0)).astype("f4")
-        # It has no ground: below the horizon it goes on as at it.
-        pixels[: SIZE[1] // 2] = pixels[SIZE[1] // 2]
-        return Sky(pixels, np.zeros(3), np.zeros(3))
+        return hosek(elevation, turbidity, float(params.get("ground_albedo", 0.3)))
     size = max(float(params.get("sun_size", 0.00951)), 1e-6)
     altitude = float(params.get("altitude", 0.0))
     model = {"SINGLE_SCATTERING": _Single, "NISHITA": _Single, "MULTIPLE_SCATTERING": _Multiple}.get(kind)
@@ -95,7 +90,11 @@ def _directions(elevation: np.ndarray, azimuth: np.ndarray) -> np.ndarray:
 
 def _image(xyz: np.ndarray) -> np.ndarray:
     """Half an image (H, W/2, 3) of XYZ to whole pixels."""
-    rgb = np.maximum(xyz @ REC709_FROM_XYZ.T, 0.0)
+    return _mirrored(np.maximum(xyz @ REC709_FROM_XYZ.T, 0.0))
+
+
+def _mirrored(rgb: np.ndarray) -> np.ndarray:
+    """Half an image (H, W/2, 3) to whole pixels."""
     pixels = np.ones((SIZE[1], SIZE[0], 4), "f4")
     pixels[:, : SIZE[0] // 2, :3] = rgb
     pixels[:, SIZE[0] // 2 :, :3] = rgb[:, ::-1]
@@ -302,10 +301,28 @@ _ZENITH = {
     "x": ((0.00166, -0.00375, 0.00209, 0.0), (-0.02903, 0.06377, -0.03202, 0.00394), (0.11693, -0.21196, 0.06052, 0.25886)),
     "y": ((0.00275, -0.00610, 0.00317, 0.0), (-0.04214, 0.08970, -0.04153, 0.00516), (0.15346, -0.26756, 0.06670, 0.26688)),
 }
-# Cycles' Hosek sky over the multiple scattering one, as irradiance of the ground at turbidity 2.2: 1/60, 1/63, 1/62 with the
-# sun at 90, 45 and 10° (mean of the colours; a colour at 10° is off by up to 18 %).
-_HOSEK_UNIT = 1.0 / 61.0
 _PREETHAM_UNIT = 0.06  # Blender's radiance per kcd/m²
+
+
+def perez(numbers, slant, gamma) -> np.ndarray:
+    """R. Perez's formula S (1 + A e^(B·slant)) (1 + C e^(Dγ) + E cos²γ) for ``numbers`` (S, A, B, C, D, E), ``slant`` the
+    length of the way through the air and ``gamma`` the angle to the sun, rad."""
+    s, a, b, c, d, e = numbers
+    return s * (1.0 + a * np.exp(b * slant)) * (1.0 + c * np.exp(d * gamma) + e * np.cos(gamma) ** 2)
+
+
+def hosek(elevation: float, turbidity: float, albedo: float) -> Sky:
+    """L. Hosek's and A. Wilkie's sky ("An Analytic Model for Full Spectral Sky-Dome Radiance", SIGGRAPH 2012) as Blender has
+    it, by fits of Perez's formula (scripts/fit_sky.py), between which radiance is interpolated. It has no ground: below the
+    horizon it goes on as at it."""
+    rows, azimuths = _rays()
+    mu = np.clip(_directions(rows, azimuths) @ _directions(np.array([elevation]), np.array([np.pi]))[0, 0], -1.0, 1.0)
+    slant = 1.0 / (np.maximum(np.sin(rows), 1e-3) + HOSEK_SLANT)[:, None]
+    rgb = np.zeros((*mu.shape, 3))
+    for weight, numbers in hosek_neighbours(turbidity, elevation, albedo):
+        below = np.where(rows[:, None, None] < 0.0, numbers[:, 6], 1.0)
+        rgb += weight * below * np.stack([perez(n[:6], slant, np.arccos(mu)) for n in numbers], -1)
+    return Sky(_mirrored(rgb), np.zeros(3), np.zeros(3))
 
 
 def preetham(elevation: float, turbidity: float) -> Sky:
@@ -315,15 +332,14 @@ def preetham(elevation: float, turbidity: float) -> Sky:
     mu = np.clip(_directions(rows, azimuths) @ _directions(np.array([elevation]), np.array([np.pi]))[0, 0], -1.0, 1.0)
     theta = np.minimum(0.5 * np.pi - rows, 0.5 * np.pi - 0.001)[:, None]
 
-    def perez(name: str, theta, cosine):
-        a, b, c, d, e = (slope * turbidity + base for slope, base in _PEREZ[name])
-        return (1.0 + a * np.exp(b / np.cos(theta))) * (1.0 + c * np.exp(d * np.arccos(cosine)) + e * cosine**2)
+    def relative(name: str, theta, gamma):
+        return perez((1.0, *(slope * turbidity + base for slope, base in _PEREZ[name])), 1.0 / np.cos(theta), gamma)
 
     chi = (4.0 / 9.0 - turbidity / 120.0) * (np.pi - 2.0 * theta_sun)
     zenith = {"Y": _PREETHAM_UNIT * ((4.0453 * turbidity - 4.9710) * np.tan(chi) - 0.2155 * turbidity + 2.4192)}
     for name, rows_of in _ZENITH.items():
         zenith[name] = sum(np.polyval(p, theta_sun) * turbidity ** (2 - k) for k, p in enumerate(rows_of))
-    values = {n: zenith[n] * perez(n, theta, mu) / perez(n, 0.0, np.cos(theta_sun)) for n in ("Y", "x", "y")}
+    values = {n: zenith[n] * relative(n, theta, np.arccos(mu)) / relative(n, 0.0, theta_sun) for n in ("Y", "x", "y")}
     ratio = values["Y"] / np.maximum(values["y"], 1e-6)
     xyz = np.stack([values["x"] * ratio, values["Y"] + 0.0 * ratio, (1.0 - values["x"] - values["y"]) * ratio], -1)
     return Sky(_image(xyz), np.zeros(3), np.zeros(3))

@@ -183,7 +183,7 @@ def sky_texture(c: Compiler, n: Node) -> dict[str, Value]:
         c.approximate(n, f"the {n.params.get('sky_type', 'given')} sky model is a constant")
         return {"Color": c.constant((0.3, 0.3, 0.3), COLOR)}
     if n.params.get("sky_type") == "HOSEK_WILKIE":
-        c.approximate(n, "Hosek's and Wilkie's sky is taken for multiple scattering")
+        c.approximate(n, "Hosek's and Wilkie's sky is a fit, within 3 to 7 % of it at most turbidities")
     c.include("nodes/sky.glsl")
     sampler = c.image(index, "Linear", "REPEAT")
     elevation, rotation = sun_angles(n.params)

@@ -20,7 +20,6 @@ class DirectLighting(ScreenPass):
         Optional("shadow.cones"), "gbuffer.depth", "gbuffer.normal",
         Optional("gbuffer.specular", ("direct.glossy",)), Optional("gbuffer.lobe", ("direct.glossy",)),
         Optional("brdf.energy", ("direct.glossy",)), Optional("brdf.average", ("direct.glossy",)),
-        Optional("direct.subsurface", ("direct.diffuse",)),
         Optional("screen.light", ("direct.diffuse",)), Optional("world.difference", ("direct.diffuse",)),
     )  # fmt: skip
     writes = (

@@ -41,6 +41,9 @@ class GBuffer(Pass):
         Texture("gbuffer.subsurface", "gbuf_subsurface", "mean free path in m; share of the diffuse albedo that scatters "
                 "below the surface", "rgba16f", _screen,
                 when=lambda f: None if f.subsurface else "no visible material scatters below its surface"),
+        Texture("gbuffer.entry", "gbuf_entry", "roughness and index of refraction of the way into what scatters below; "
+                "luminance of its own albedo", "rgba16f", _screen,
+                when=lambda f: None if f.subsurface else "no visible material scatters below its surface"),
         Texture("gbuffer.z", "gbuf_z", "depth buffer", "depth24", _screen, scratch=True),
     )  # fmt: skip
 

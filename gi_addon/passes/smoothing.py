@@ -20,12 +20,13 @@ def raw_gather(low: str) -> tuple[Texture, Texture]:
 
 
 class BlockSmoothing(ScreenPass):
-    """Neighbouring blocks of one surface share their directions: ``low``.raw becomes ``low``, for passes/interpolate.glsl."""
+    """Neighbouring blocks of one surface share their directions: ``low``.raw becomes ``low``, for passes/interpolate.glsl.
+    ``in_pairs`` leaves light that falls off towards a surface's edge as it is, with more noise there."""
 
     fragment = "passes/smooth_blocks_frag.glsl"
 
-    def __init__(self, low: str, title: str, figure: str = "") -> None:
-        self.title, self.figure = title, figure
+    def __init__(self, low: str, title: str, figure: str = "", *, in_pairs: bool = False) -> None:
+        self.title, self.figure, self.in_pairs = title, figure, in_pairs
         self.reads = (f"{low}.raw", f"{low}.raw_direction", "gbuffer.low_depth", "gbuffer.low_normal", "gbuffer.low_pixel")
         self.writes = (
             Texture(low, "low_indirect", LIGHT, "rgba32f", gather_size, scratch=True),
@@ -33,4 +34,4 @@ class BlockSmoothing(ScreenPass):
         )  # fmt: skip
 
     def defines(self, facts: Facts) -> dict[str, int]:
-        return {"GATHER_SCALE": facts.settings.gather_scale}
+        return {"GATHER_SCALE": facts.settings.gather_scale, "IN_PAIRS": int(self.in_pairs)}

@@ -26,12 +26,14 @@ class Air:
 
 
 def air(facts: Facts) -> Air | None:
-    """What fills the scene: the world's own medium, everywhere; else the setting's haze, in the scene's bounds."""
+    """What fills the scene: the world's own medium, everywhere; else a volume object's, in its box; else the setting's haze,
+    in the scene's bounds."""
     volume = facts.settings.volume
     if not facts.settings.use_volumetric:
         return None
     if facts.medium is not None:
-        return Air(facts.medium, np.array([[-_EVERYWHERE] * 3, [_EVERYWHERE] * 3]))
+        everywhere = np.array([[-_EVERYWHERE] * 3, [_EVERYWHERE] * 3])
+        return Air(facts.medium, everywhere if facts.medium_box is None else facts.medium_box)
     if volume.density > 0.0:
         return Air(Medium((volume.density,) * 3, (0.0,) * 3, anisotropy=volume.anisotropy), facts.rig.bounds)
     return None
@@ -92,7 +94,7 @@ class Volumetric(ScreenPass):
     def absent(self, facts: Facts) -> str | None:
         if not facts.settings.use_volumetric:
             return "volumetric light is switched off"
-        return None if air(facts) is not None else "the world has no volume, and volume.density is 0"
+        return None if air(facts) is not None else "neither the world nor an object is a volume, and volume.density is 0"
 
     def prepare(self, frame: Frame, planned: Planned, program) -> None:
         facts = planned.facts

@@ -19,6 +19,7 @@ struct Closure {
     vec3 translucent;            // diffuse to the far side
     vec3 subsurface;             // part of `diffuse` that scatters below the surface
     vec3 subsurface_radius;      // × luminance of subsurface, m
+    vec3 subsurface_entry;       // × luminance of subsurface: roughness and index of the way in; luminance of its albedo
     vec3 normal_ws;              // × weight
     float holdout;               // share that is cut out of the picture
 };
@@ -26,7 +27,7 @@ struct Closure {
 Closure closure_none()
 {
     return Closure(vec3(0.0), vec3(0.0), vec3(0.0), 0.0, 0.0, 0.0, 0.0, vec3(0.0), vec3(0.0), vec3(0.0), 0.0, 0.0,
-                   vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0), 0.0);
+                   vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0), 0.0);
 }
 
 Closure closure_scale(Closure a, float k)
@@ -34,7 +35,7 @@ Closure closure_scale(Closure a, float k)
     return Closure(a.diffuse * k, a.f0 * k, a.f90 * k, a.gloss * k, a.roughness * k, a.eta * k, a.multiscatter * k,
                    a.emission * k, a.transparent * k, a.transmission * k, a.transmission_roughness * k,
                    a.transmission_eta * k, a.translucent * k, a.subsurface * k, a.subsurface_radius * k,
-                   a.normal_ws * k, a.holdout * k);
+                   a.subsurface_entry * k, a.normal_ws * k, a.holdout * k);
 }
 
 Closure closure_add(Closure a, Closure b)
@@ -44,8 +45,8 @@ Closure closure_add(Closure a, Closure b)
                    a.transparent + b.transparent, a.transmission + b.transmission,
                    a.transmission_roughness + b.transmission_roughness, a.transmission_eta + b.transmission_eta,
                    a.translucent + b.translucent, a.subsurface + b.subsurface,
-                   a.subsurface_radius + b.subsurface_radius, a.normal_ws + b.normal_ws,
-                   a.holdout + b.holdout);
+                   a.subsurface_radius + b.subsurface_radius, a.subsurface_entry + b.subsurface_entry,
+                   a.normal_ws + b.normal_ws, a.holdout + b.holdout);
 }
 
 Closure closure_mix(Closure a, Closure b, float t)

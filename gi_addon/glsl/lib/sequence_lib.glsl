@@ -44,6 +44,13 @@ vec2 sobol_2d(uint index, uint seed)
                 unit_float(owen_scramble(y, hash_u32(seed0 ^ 0x7F4A7C15u))));
 }
 
+// The R2 sequence: multiples of 1/g and 1/g², g³ = g + 1, here in units of 2^−32, whose every run is even (M. Roberts, "The
+// Unreasonable Effectiveness of Quasirandom Sequences", 2018).
+vec2 r2_sequence(uint index)
+{
+    return vec2(unit_float(index * 3242174889u + 0x80000000u), unit_float(index * 2447445414u + 0x80000000u));
+}
+
 // --- warps of the unit square ----------------------------------------------------------------------------------------
 
 // Uniform on the unit disc: P. Shirley and K. Chiu's concentric map, JGT 2(3), 1997.

@@ -19,6 +19,13 @@ vec3 surface_layer_albedo(SurfacePoint point, vec3 n, vec3 f0, float f90, float 
 #endif
 }
 
+// "Specular IOR Level" scales F0; ½ leaves the index alone.
+float principled_ior(float ior, float level)
+{
+    ior = max(ior, 1e-5);
+    return level != 0.5 ? ior_from_f0(f0_from_ior(ior) * 2.0 * max(level, 0.0)) : ior < 1.0 ? 1.0 / ior : ior;
+}
+
 Closure principled_closure(vec3 base, float metallic, float roughness, float ior, float level, vec3 tint, vec3 n,
                            float multiscatter, SurfacePoint point)
 {
@@ -28,15 +35,8 @@ Closure principled_closure(vec3 base, float metallic, float roughness, float ior
     level = max(level, 0.0);
     vec3 metal_f0 = saturate(base);
 
-    // "Specular IOR Level" scales F0; ½ leaves the index alone.
-    float f0 = f0_from_ior(ior);
-    float eta = ior;
-    if (level != 0.5) {
-        f0 *= 2.0 * level;
-        eta = ior_from_f0(f0);
-    } else if (eta < 1.0) {
-        eta = 1.0 / eta; // seen from outside a thinner medium: same F0, no total reflection in the table
-    }
+    float f0 = f0_from_ior(ior) * 2.0 * level;
+    float eta = principled_ior(ior, level); // seen from outside a thinner medium: same F0, no total reflection in the table
     vec3 layer_f0 = saturate(f0 * max(tint, vec3(0.0)));
     bool has_layer = eta > 1.0;
     vec3 layer_albedo =
@@ -74,10 +74,13 @@ void principled_transmission(inout Closure c, vec3 base, float metallic, float r
     c.transmission_eta = ior * amount;
 }
 
-void principled_subsurface(inout Closure c, float weight, vec3 radius)
+// Light goes in as through a rough surface of this index of refraction, and comes out diffuse, as in Cycles. What layers above
+// take is not the medium's: its own albedo is the base's.
+void principled_subsurface(inout Closure c, vec3 base, float weight, vec3 radius, float roughness, float ior)
 {
     c.subsurface = c.diffuse * saturate(weight);
     c.subsurface_radius = max(radius, vec3(0.0)) * luminance(c.subsurface);
+    c.subsurface_entry = vec3(saturate(roughness), max(ior, 1.0), luminance(max(base, vec3(0.0)))) * luminance(c.subsurface);
 }
 
 // A clear layer on top: it takes its albedo from all below and adds a lobe of its own, merged into the glossy one.
@@ -97,6 +100,8 @@ void principled_coat(inout Closure c, float weight, float roughness, float ior, 
     vec3 normal_ws = c.normal_ws;
     c.diffuse *= passed;
     c.subsurface *= passed;
+    c.subsurface_radius *= luminance(passed);
+    c.subsurface_entry *= luminance(passed);
     c.f0 *= passed;
     c.f90 *= passed;
     c.emission *= passed;

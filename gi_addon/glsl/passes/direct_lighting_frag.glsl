@@ -84,10 +84,6 @@ void main()
 #if HAS_WORLD_DIFFERENCE
         diffuse += texelFetch(world_difference, pixel, 0).rgb;
 #endif
-#if HAS_DIRECT_SUBSURFACE
-        vec4 below = texelFetch(direct_subsurface, pixel, 0);
-        diffuse = mix(diffuse, below.rgb, below.a);
-#endif
 #if HAS_SCREEN_LIGHT
         diffuse += texelFetch(screen_light, pixel, 0).rgb; // the world and emissive pixels, where screen space gathers them
 #endif

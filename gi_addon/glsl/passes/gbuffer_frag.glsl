@@ -53,6 +53,9 @@ void main()
     gbuf_subsurface = vec4(scattered > 0.0 ? c.subsurface_radius / scattered : vec3(0.0),
                            scattered / max(luminance(c.diffuse), 1e-6));
 #endif
+#if HAS_GBUF_ENTRY
+    gbuf_entry = vec4(luminance(c.subsurface) > 0.0 ? c.subsurface_entry / luminance(c.subsurface) : vec3(1.0), 1.0);
+#endif
 #if HAS_GBUF_EMISSION
     gbuf_emission = vec4(c.emission * gain, 1.0);
 #endif

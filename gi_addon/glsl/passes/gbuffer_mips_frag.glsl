@@ -7,6 +7,12 @@
 #include "lib/sequence_lib.glsl"
 #include "passes/gather_grid.glsl"
 
+// The n-th number of a block's 0 … GATHER_SCALE − 1, from its middle outwards.
+ivec2 outwards(ivec2 n)
+{
+    return GATHER_SCALE / 2 + (n + 1) / 2 * (1 - 2 * (n & 1));
+}
+
 void main()
 {
     ivec2 view_block_offset = gather_grid_offset();
@@ -19,8 +25,8 @@ void main()
     ivec2 pick = ivec2(0);
     for (int y = 0; y < GATHER_SCALE; ++y) {
         for (int x = 0; x < GATHER_SCALE; ++x) {
-            // Start from the block's middle, so that a flat block picks that.
-            ivec2 p = (ivec2(x, y) + GATHER_SCALE / 2) % GATHER_SCALE;
+            // Outwards from the block's middle, so that a flat block picks that, and others what is near it.
+            ivec2 p = outwards(ivec2(x, y));
             ivec2 pixel = block * GATHER_SCALE + p - view_block_offset;
             if (any(lessThan(pixel, ivec2(0))) || any(greaterThanEqual(pixel, size))) {
                 continue;

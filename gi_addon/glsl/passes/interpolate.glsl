@@ -18,7 +18,8 @@ float linear_irradiance(vec4 direction, vec3 n) { return max(0.25 * direction.w 
 bool interpolated_indirect(vec3 position_ws, vec3 n, vec3 ng, float depth, out vec3 radiance)
 {
     float scale = float(GATHER_SCALE);
-    vec2 at = (gl_FragCoord.xy + vec2(gather_grid_offset())) / scale - 0.5;
+    // A block's light is that of its middle pixel, for even blocks the one above and right of the middle (gbuffer_mips_frag.glsl).
+    vec2 at = (gl_FragCoord.xy + vec2(gather_grid_offset()) - (float(GATHER_SCALE / 2) + 0.5)) / scale;
     ivec2 base = ivec2(floor(at));
     vec2 f = at - vec2(base);
     ivec2 last = textureSize(low_depth, 0) - 1;

@@ -1,6 +1,7 @@
 // Reflective shadow map: depth, normals, and the share of the arriving light that is reflected, averaged over all sides:
 // C. Dachsbacher and M. Stamminger, "Reflective Shadow Maps", I3D 2005. A texel's flux is its share of the light's power
-// × that albedo (engines/rsm/rsm_lib.glsl). Depth as in shadow_map_frag.glsl.
+// × that albedo (engines/rsm/rsm_lib.glsl). Normals point to the side that the light leaves by: away from the light where it
+// shines through. Depth as in shadow_map_frag.glsl.
 
 #include "surface/surface_point.glsl"
 
@@ -18,14 +19,24 @@ void main()
     float gain = opacity > 0.0 ? 1.0 / opacity : 1.0;
     vec3 n = safe_normalize(c.normal_ws);
     n = dot(n, n) < 0.5 ? p.normal_ws : n;
-#if HAS_RSM_NORMAL
-    rsm_normal = vec4(octahedral_encode(n), octahedral_encode(p.geometric_normal_ws));
-#endif
-#if HAS_RSM_ALBEDO
+    vec3 ng = p.geometric_normal_ws;
     vec3 albedo = c.diffuse;
 #if SURFACE_TABLES > 0
     albedo += lobe_albedo(brdf_albedo, brdf_average, brdf_energy, closure_lobe(c), saturate(dot(n, to_light)));
 #endif
+    // What goes through to the far side leaves there: a texel stands for one of the sides, by their shares, for both.
+    float through = luminance(c.translucent);
+    if (through > 0.0) {
+        float share = through / (through + luminance(albedo));
+        bool far = unit_float(hash_u32(uvec3(uvec2(gl_FragCoord.xy), 3u))) < share;
+        albedo = far ? c.translucent / share : albedo / (1.0 - share);
+        n = far ? -n : n;
+        ng = far ? -ng : ng;
+    }
+#if HAS_RSM_NORMAL
+    rsm_normal = vec4(octahedral_encode(n), octahedral_encode(ng));
+#endif
+#if HAS_RSM_ALBEDO
     rsm_albedo = vec4(albedo * gain, 1.0);
 #endif
 #if HAS_RSM_DEPTH

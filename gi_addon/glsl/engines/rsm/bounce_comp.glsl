@@ -29,6 +29,7 @@ void main()
     vpl.position_ws = s.position_ws;
     vpl.normal_ws = chosen ? s.normal_ws : -s.normal_ws;
     vpl.light = -1;
+    vpl.anisotropy = 0.0;
     vpl.flux = share > 0.0 ? s.albedo * (chosen ? front : back) * (s.area * (a + b) / share) : vec3(0.0);
     vpl.area = s.area;
     vpls[vpl_count + i] = vpl;

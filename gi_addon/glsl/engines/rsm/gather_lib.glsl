@@ -52,7 +52,8 @@ Gathered gather_some_vpls(vec3 position_ws, vec3 n, vec3 ng, int first, int stri
         float d2 = dot(d, d);
         float inverse = inversesqrt(max(d2, 1e-37));
         vec3 w = d * inverse;
-        float cos_p = -dot(w, vpl.normal_ws);
+        bool in_air = vpl.light == VPL_AIR;
+        float cos_p = in_air ? 1.0 : -dot(w, vpl.normal_ws);
         float cos_g = dot(w, ng);
         if (cos_p <= 0.0 || cos_g <= 0.0) {
             continue;
@@ -63,17 +64,21 @@ Gathered gather_some_vpls(vec3 position_ws, vec3 n, vec3 ng, int first, int stri
         }
 #endif
 #if HAS_OCCUPANCY
-        if (cells_block(start_ws, cells_clear(vpl.position_ws, vpl.normal_ws))) {
+        if (cells_block(start_ws, in_air ? vpl.position_ws : cells_clear(vpl.position_ws, vpl.normal_ws))) {
             continue;
         }
 #endif
         float cos_x = max(dot(w, n), 0.0);
         // Φ/A · K A/(1 + K A) without the area: Φ cos cos / (π d² + cos cos A).
         float product = cos_p * cos_x;
-        float area = vpl.area * float(stride) * (vpl.light >= 0 ? alone : 1.0);
+        float area = vpl.area * float(stride) * (vpl.light >= 0 || in_air ? alone : 1.0);
         float kernel = product / (PI * d2 + product * area);
         vec3 flux = vpl.flux;
 #if HAS_MEDIUM
+        if (in_air) {
+            // E = Φ p(θ) cosθ_x / (d² + r²): the form above, with π p in place of the sender's cosine.
+            flux *= PI * henyey_greenstein(-dot(w, vpl.normal_ws), vpl.anisotropy);
+        }
         flux *= medium_transmittance(position_ws, w, sqrt(d2));
 #endif
         g.radiance += flux * kernel;

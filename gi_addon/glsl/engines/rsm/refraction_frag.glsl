@@ -13,7 +13,18 @@ void main()
     ivec2 pixel = ivec2(gl_FragCoord.xy);
     float depth = texelFetch(translucent_depth, pixel, 0).r;
     transmission_indirect = vec4(0.0);
-    if (depth <= 0.0 || texelFetch(translucent_medium, pixel, 0).g > 0.5) {
+    if (depth <= 0.0) {
+        return;
+    }
+    if (texelFetch(translucent_medium, pixel, 0).g > 0.5) {
+        // What scatters light on shows what its far side receives, E/π, tinted.
+#if HAS_VPLS
+        vec4 normals = texelFetch(translucent_normal, pixel, 0);
+        vec2 uv = gl_FragCoord.xy * view.inverse_resolution;
+        vec3 far = gather_vpls(position_ws_from_depth(uv, depth), -octahedral_decode(normals.xy),
+                               -octahedral_decode(normals.zw)).radiance;
+        transmission_indirect = vec4(far * texelFetch(translucent_color, pixel, 0).rgb, 1.0);
+#endif
         return;
     }
     uint seed = hash_u32(uvec2(pixel + view.pixel_offset));

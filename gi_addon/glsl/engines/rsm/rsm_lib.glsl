@@ -8,7 +8,7 @@
 
 struct RsmTexel {
     vec3 position_ws;
-    vec3 normal_ws;    // of the triangle, towards the light
+    vec3 normal_ws;    // of the triangle, to the side that the light leaves by
     vec3 flux;         // reflected, W
     float area;        // of the surface that the texel shows, m²
 };
@@ -61,8 +61,9 @@ RsmTexel rsm_texel(int index, ivec2 pixel)
     t.position_ws = light_view_position(v, xy, depth);
     t.normal_ws = octahedral_decode(normals.zw);
     vec3 to_light = v.perspective > 0.5 ? normalize(v.origin_ws - t.position_ws) : -v.axis_z;
-    float cos_g = max(dot(t.normal_ws, to_light), GRAZING_COS);
-    float cos_s = max(dot(n, to_light), 0.0);
+    float side = dot(t.normal_ws, to_light) < 0.0 ? -1.0 : 1.0; // by which the light leaves
+    float cos_g = max(side * dot(t.normal_ws, to_light), GRAZING_COS);
+    float cos_s = max(side * dot(n, to_light), 0.0);
     t.area = beam / cos_g;
 #if HAS_MEDIUM
     arriving *= medium_transmittance(t.position_ws, to_light, v.perspective > 0.5 ? length(v.origin_ws - t.position_ws) : 1e30);

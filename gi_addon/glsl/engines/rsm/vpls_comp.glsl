@@ -20,6 +20,7 @@ void main()
     none.position_ws = vec3(0.0);
     none.area = 0.0;
     none.light = 0;
+    none.anisotropy = 0.0;
     none.normal_ws = vec3(0.0, 0.0, 1.0);
     none.flux = vec3(0.0);
     vpls[i] = none;
@@ -66,7 +67,7 @@ void main()
     }
     RsmTexel t = rsm_texel(index, p);
     float probability = flux / total;
-    Vpl vpl;
+    Vpl vpl = none;
     vpl.position_ws = t.position_ws;
     vpl.normal_ws = t.normal_ws;
     vpl.light = rsm_views[index].light;

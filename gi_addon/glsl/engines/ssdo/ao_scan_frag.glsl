@@ -32,18 +32,15 @@ void main()
         float phi = PI * u.x;
         vec3 t = frame * vec3(cos(phi), sin(phi), 0.0);
         Slice slice = make_slice(n, v, t, u.y);
-        float horizon = atan(dot(ng, t), max(dot(ng, v), 1e-6));
-        uint mask = ~sectors_between(slice, horizon - 0.5 * PI, horizon + 0.5 * PI);
+        uint mask = ~sectors_above(slice, ng, v, t);
         vec2 along = screen_direction(c, t);
-        for (int k = 0; k < 2 * ao_steps; ++k) {
-            bool turned = k >= ao_steps;
-            float side = turned ? -1.0 : 1.0;
-            int step_ = turned ? k - ao_steps : k;
-            float jitter = fract(jitters.x + 7.0 * turn + 0.618034 * float(2 * i + int(turned)));
-            vec2 way = along * (side * min(pixels_to_edge(origin.xy, along * side), radius));
-            SliceSample s = slice_sample(slice, origin, position_ws, v, way, side, step_, ao_steps, jitter, ao_thickness);
-            if (s.distance > 0.0 && s.distance <= ao_distance) {
-                mask |= s.sectors;
+        for (int turned = 0; turned < 2; ++turned) {
+            vec2 side = along * (1.0 - 2.0 * float(turned));
+            Scan scan = begin_scan(origin, v, t, side * min(pixels_to_edge(origin.xy, side), radius), ao_steps,
+                                   fract(jitters.x + 7.0 * turn + 0.618034 * float(2 * i + turned)), ao_thickness);
+            for (int k = 0; k <= ao_steps; ++k) {
+                Covered r = scan_next(scan, slice, k);
+                mask |= r.distance > 0.0 && r.distance <= ao_distance ? r.sectors : 0u;
             }
         }
         open_share += float(bitCount(~mask)) / SECTORS * slice.weight;

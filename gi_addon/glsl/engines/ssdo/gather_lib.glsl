@@ -1,18 +1,12 @@
-// Light from what the screen shows: over cosine-distributed rays, or over slices with a visibility bitmask. Included where
+// Light from what the screen shows, over slices of the hemisphere with a visibility bitmask (slice_lib.glsl). Included where
 // `ssdo_planes` and the radiance that leaves each pixel (`ssdo_sent`, or `gbuf_emission`) are declared.
 //
-// Rays: direction pdf cosθ/π, so E/π is the mean radiance the rays find (T. Ritschel et al., "Approximating Dynamic Global
-// Illumination in Image Space", I3D 2009, with a march in place of one point per ray: their point is inside some geometry
-// or not, and what light it then sends is a guess). A sender sends from its front only. Where GATHER_WORLD is 1 a direction
-// that meets nothing takes the world's light: directional occlusion.
+// T. Ritschel et al., "Approximating Dynamic Global Illumination in Image Space", I3D 2009, take one point per direction, which
+// is inside some geometry or not, and what light it then sends is a guess; a slice knows what it covers. A sender sends from its
+// front only. Where GATHER_WORLD is 1 a direction that meets nothing takes the world's light: directional occlusion.
 
-#include "engines/ssdo/screen_lib.glsl"
-#include "lib/sequence_lib.glsl"
-#if SSDO_RAYS
-#include "engines/ssdo/march_lib.glsl"
-#else
 #include "engines/ssdo/scan_lib.glsl"
-#endif
+#include "lib/sequence_lib.glsl"
 #if GATHER_WORLD
 #include "generated/world.glsl"
 #endif
@@ -44,55 +38,37 @@ void add_light(inout Gathered g, vec3 light, vec3 direction, float cos_n)
     g.direction += vec4(direction, 1.0) * (luminance(light) * PI / max(cos_n, LEAST_COS));
 }
 
-Gathered gather_screen(vec3 position_ws, vec3 n, vec3 ng, vec3 v, uint seed)
+Gathered gather_screen(vec3 position_ws, vec3 n, vec3 ng, vec3 v, ivec2 place)
 {
     Gathered g = Gathered(vec3(0.0), vec4(0.0));
     float reach = ssdo_radius > 0.0 ? ssdo_radius : 2.0 * view.scene_radius;
-    vec2 turn = unit_shift(seed);
     vec3 origin = screen_from_ws(position_ws);
-    vec2 jitters = sobol_2d(view.subframe, 41u);
-#if SSDO_RAYS
-    mat3 frame = frame_from_normal(n);
-    for (int i = 0; i < ssdo_directions; ++i) {
-        vec3 local = warp_cosine_hemisphere(fract(sobol_2d(view.subframe * uint(ssdo_directions) + uint(i), 40u) + turn));
-        vec3 direction = frame * local;
-        if (dot(direction, ng) > 0.0) {
-            float jitter = fract(jitters.x + turn.x + 0.618034 * float(i)); // golden ratio: even at every count
-            ScreenHit hit = march(position_ws, direction, reach, ssdo_steps, ssdo_thickness, jitter);
-            if (hit.found && faces(texelFetch(ssdo_planes, hit.pixel, 0), hit.pixel, origin)) {
-                add_light(g, sent_from(hit.pixel), direction, local.z);
-            }
-#if GATHER_WORLD
-            if (!hit.found) {
-                add_light(g, world_radiance(direction), direction, local.z);
-            }
-#endif
-        }
-    }
-#else
+    // 2 × 2 neighbours and all sub-frames have parts of one set of slices.
+    uint run = 4u * view.subframe + uint((place.x & 1) + 2 * (place.y & 1));
     mat3 frame = frame_from_normal(v);
     vec4 c = view.clip_from_world * vec4(position_ws, 1.0);
-    for (int i = 0; i < ssdo_directions; ++i) {
-        vec2 u = fract(sobol_2d(view.subframe * uint(ssdo_directions) + uint(i), 40u) + turn);
-        float phi = PI * u.x;
+    for (int i = 0; i < ssdo_slices; ++i) {
+        vec2 u = r2_sequence(run * uint(ssdo_slices) + uint(i));
+        // Evenly about the eye's direction; each further run halves the gaps.
+        float phi = PI * (float(i) + unit_float(bitfieldReverse(run))) / float(ssdo_slices);
         vec3 t = frame * vec3(cos(phi), sin(phi), 0.0);
         Slice slice = make_slice(n, v, t, u.y);
-        float horizon = atan(dot(ng, t), max(dot(ng, v), 1e-6));
-        uint mask = ~sectors_between(slice, horizon - 0.5 * PI, horizon + 0.5 * PI);
+        uint mask = ~sectors_above(slice, ng, v, t);
         vec2 along = screen_direction(c, t);
-        for (int k = 0; k < 2 * ssdo_steps; ++k) {
-            bool turned = k >= ssdo_steps;
-            float side = turned ? -1.0 : 1.0;
-            int step_ = turned ? k - ssdo_steps : k;
-            float jitter = fract(jitters.x + turn.y + 0.618034 * float(2 * i + int(turned)));
-            vec2 way = along * (side * pixels_to_edge(origin.xy, along * side));
-            SliceSample s = slice_sample(slice, origin, position_ws, v, way, side, step_, ssdo_steps, jitter, ssdo_thickness);
-            uint seen = s.sectors & ~mask;
-            if (seen != 0u && s.distance <= reach) {
-                mask |= seen;
-                if (faces(s.plane, s.pixel, origin)) {
-                    float share = float(bitCount(seen)) / SECTORS * slice.weight;
-                    add_light(g, sent_from(s.pixel) * share, s.direction, dot(s.direction, n));
+        for (int turned = 0; turned < 2; ++turned) {
+            vec2 side = along * (1.0 - 2.0 * float(turned));
+            Scan scan = begin_scan(origin, v, t, side * pixels_to_edge(origin.xy, side), ssdo_steps,
+                                   fract(u.x + 0.5 * float(turned)), ssdo_thickness);
+            for (int k = 0; k <= ssdo_steps; ++k) {
+                Covered r = scan_next(scan, slice, k);
+                uint seen = r.sectors & ~mask;
+                if (seen != 0u && r.distance <= reach) {
+                    mask |= seen;
+                    if (faces(r.at.plane, r.at.pixel, origin)) {
+                        vec3 direction = v * r.direction.x + t * r.direction.y;
+                        float share = float(bitCount(seen)) / SECTORS * slice.weight;
+                        add_light(g, sent_from(r.at.pixel) * share, direction, dot(direction, n));
+                    }
                 }
             }
         }
@@ -100,7 +76,7 @@ Gathered gather_screen(vec3 position_ws, vec3 n, vec3 ng, vec3 v, uint seed)
         // One of the open sectors stands for all of them.
         uint open = ~mask;
         int count = bitCount(open);
-        int pick = int(fract(u.y + 0.5 + turn.x) * float(count));
+        int pick = int(fract(u.y + 0.5) * float(count));
         int found = 0;
         for (int bit = 0; bit < 32; ++bit) {
             if ((open >> uint(bit) & 1u) != 0u) {
@@ -111,14 +87,13 @@ Gathered gather_screen(vec3 position_ws, vec3 n, vec3 ng, vec3 v, uint seed)
             }
         }
         if (count > 0) {
-            float theta = slice_middle(slice, found);
-            vec3 direction = v * cos(theta) + t * sin(theta);
+            vec2 middle = slice_middle(slice, found);
+            vec3 direction = v * middle.x + t * middle.y;
             add_light(g, world_radiance(direction) * (float(count) / SECTORS * slice.weight), direction, dot(direction, n));
         }
 #endif
     }
-#endif
-    g.radiance /= float(ssdo_directions);
-    g.direction /= float(ssdo_directions);
+    g.radiance /= float(ssdo_slices);
+    g.direction /= float(ssdo_slices);
     return g;
 }

@@ -5,12 +5,13 @@
 
 void main()
 {
-    Receiver r = gather_receiver(ivec2(gl_FragCoord.xy));
+    ivec2 block = ivec2(gl_FragCoord.xy);
+    Receiver r = gather_receiver(block);
     raw_indirect = vec4(0.0);
     raw_direction = vec4(0.0);
     if (r.exists) {
         vec2 uv = (vec2(r.pixel) + 0.5) * view.inverse_resolution;
-        Gathered g = gather_screen(r.position_ws, r.n, r.ng, view_direction_ws(uv), hash_u32(uvec2(r.pixel + view.pixel_offset)));
+        Gathered g = gather_screen(r.position_ws, r.n, r.ng, view_direction_ws(uv), block);
         raw_indirect = vec4(g.radiance, 1.0);
         raw_direction = g.direction;
     }

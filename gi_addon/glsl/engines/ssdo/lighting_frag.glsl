@@ -36,7 +36,7 @@ void main()
     found = interpolated_indirect(position_ws, n, ng, depth, radiance);
 #endif
     if (!found) {
-        radiance = gather_screen(position_ws, n, ng, view_direction_ws(uv), hash_u32(uvec2(pixel + view.pixel_offset))).radiance;
+        radiance = gather_screen(position_ws, n, ng, view_direction_ws(uv), pixel + view.pixel_offset).radiance;
     }
     set_light(radiance);
 }

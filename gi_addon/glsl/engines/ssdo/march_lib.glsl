@@ -24,14 +24,14 @@ ScreenHit march(vec3 start_ws, vec3 direction_ws, float reach, int steps, float 
     bool perspective = view.orthographic < 0.5;
     ivec2 last = textureSize(ssdo_planes, 0) - 1;
     // Rounding of q, of which a ray's start has no more to spare.
-    float rounding = 1e-6 * (perspective ? a.z : view.scene_radius);
+    float rounding = nearness_rounding(a);
     for (int k = 0; k < steps; ++k) {
         if (!hit.found) {
-            float s = spacing(k, steps, jitter);
+            float s = spacing(float(k), steps, jitter);
             ivec2 pixel = clamp(ivec2(mix(a.xy, b.xy, s)), ivec2(0), last);
             vec4 plane = texelFetch(ssdo_planes, pixel, 0);
-            float s_before = 0.5 * (s + (k > 0 ? spacing(k - 1, steps, jitter) : 0.0));
-            float s_after = 0.5 * (s + (k + 1 < steps ? spacing(k + 1, steps, jitter) : 1.0));
+            float s_before = k > 0 ? spacing(float(k) - 0.5, steps, jitter) : 0.0;
+            float s_after = k + 1 < steps ? spacing(float(k) + 0.5, steps, jitter) : 1.0;
             vec3 before = mix(a, b, s_before);
             vec3 after = mix(a, b, s_after);
             float surface = plane_near(plane, pixel, before.xy);

@@ -1,12 +1,16 @@
-// The screen's samples of a slice (slice_lib.glsl). Included where `ssdo_planes` is declared.
+// The screen's samples of a slice (slice_lib.glsl), one side of it at a time. Included where `ssdo_planes` is declared.
 //
-// A sample stands for its surface as far as half-way to the samples before and after it, and for as much behind it as it is
-// taken to be thick. The paper leaves the gaps between samples open, and loses light in them.
+// A sample stands for its surface as far as that goes: to where it meets the plane of the next sample, if that is between the
+// two, and half-way else; and for as much behind it as it is taken to be thick. The paper leaves the gaps between samples
+// open, and loses light in them.
+//
+// In slice coordinates (x along v, y along T) the point at a share s of the way, with nearness q, is
+//   (g (q − q₀) + s a.x, s a.y) / q   (orthographic: without / q),
+// g and a constant along the way: d = o + z D(s) − p with D linear in s and p = o + z₀ D(0), D(0) = −|D(0)| v, z = 1/q.
+// Directions need no division, and no position in the world.
 
 #include "engines/ssdo/screen_lib.glsl"
 #include "engines/ssdo/slice_lib.glsl"
-
-vec3 surface_ws(vec4 plane, ivec2 pixel, vec2 p) { return ws_from_screen(vec3(p, plane_near(plane, pixel, p))); }
 
 // Pixels from `from` to the picture's edge along a unit direction.
 float pixels_to_edge(vec2 from, vec2 along)
@@ -24,37 +28,107 @@ vec2 screen_direction(vec4 c, vec3 t)
     return along * inversesqrt(max(dot(along, along), 1e-37));
 }
 
-// What the k-th sample along `way` (pixels) covers of a slice.
-struct SliceSample {
+struct ScreenSample {
     ivec2 pixel;
     vec4 plane;
-    vec3 direction;
-    float distance;  // world units; 0 where nothing is
+    float s;      // share of the way
+};
+
+struct Scan {
+    vec3 origin;      // the receiver in screen coordinates
+    vec2 way;         // pixels
+    vec2 across;      // a
+    float per_near;   // g
+    int steps;
+    float jitter;
+    float thickness;
+    float pixel;      // share of the way that is one pixel
+    ScreenSample last;
+    float since;      // share of the way from where `last` stands
+};
+
+Scan begin_scan(vec3 origin, vec3 v, vec3 t, vec2 way, int steps, float jitter, float thickness)
+{
+    Scan scan;
+    bool perspective = view.orthographic < 0.5;
+    vec2 uv = way * view.inverse_resolution;
+    vec3 change = perspective ? view.direction_u * uv.x + view.direction_v * uv.y : view.origin_u * uv.x + view.origin_v * uv.y;
+    float eye = length(ray_direction_ws(origin.xy * view.inverse_resolution));
+    scan.origin = origin;
+    scan.way = way;
+    scan.across = vec2(dot(change, v), dot(change, t));
+    scan.per_near = perspective ? eye / origin.z : eye;
+    scan.steps = steps;
+    scan.jitter = jitter;
+    scan.pixel = inversesqrt(max(dot(way, way), 1.0));
+    scan.thickness = thickness;
+    scan.last.pixel = ivec2(origin.xy);
+    scan.last.plane = texelFetch(ssdo_planes, scan.last.pixel, 0);
+    scan.last.s = 0.0;
+    scan.since = 0.0;
+    return scan;
+}
+
+// Direction, with a length of its own, of a sample's surface continued to a share of the way.
+vec2 slice_toward(Scan scan, ScreenSample a, float s)
+{
+    return vec2(scan.per_near * (plane_near(a.plane, a.pixel, scan.origin.xy + scan.way * s) - scan.origin.z), 0.0) + scan.across * s;
+}
+
+vec2 unit(vec2 d) { return d * inversesqrt(max(dot(d, d), 1e-37)); }
+
+float plane_at(ScreenSample a, vec2 p) { return a.plane.x + dot(a.plane.yz, p - (vec2(a.pixel) + 0.5)); }
+
+// What a sample covers of a slice.
+struct Covered {
+    ScreenSample at;
+    vec2 direction;   // unit, in the slice
+    float distance;   // world units; 0 where nothing is
     uint sectors;
 };
 
-SliceSample slice_sample(Slice slice, vec3 origin, vec3 position_ws, vec3 v, vec2 way, float side, int k, int steps,
-                         float jitter, float thickness)
+// What the pixel before the k-th sample's covers, which is known when that is another: k from 0 to `steps`, where the way ends.
+// All samples of one pixel are one. The receiver's own pixel covers nothing.
+Covered scan_next(inout Scan scan, Slice slice, int k)
 {
-    float s = spacing(k, steps, jitter);
-    vec2 p = origin.xy + way * s;
-    SliceSample r;
-    r.pixel = ivec2(p);
-    r.plane = texelFetch(ssdo_planes, r.pixel, 0);
-    r.sectors = 0u;
-    vec3 d = surface_ws(r.plane, r.pixel, p) - position_ws;
-    r.distance = r.plane.x > 0.5 * NOTHING ? length(d) : 0.0;
-    r.direction = d / max(r.distance, 1e-30);
-    if (r.distance > 0.0) {
-        // Its surface stands for the screen half-way to the samples before and after it.
-        float s_before = 0.5 * (s + (k > 0 ? spacing(k - 1, steps, jitter) : 0.0));
-        float s_after = 0.5 * (s + (k + 1 < steps ? spacing(k + 1, steps, jitter) : 1.0));
-        float theta = slice_angle(d, v, side);
-        float before = slice_angle(surface_ws(r.plane, r.pixel, origin.xy + way * s_before) - position_ws, v, side);
-        float after = slice_angle(surface_ws(r.plane, r.pixel, origin.xy + way * s_after) - position_ws, v, side);
-        float behind = slice_angle(d - v * (thickness * r.distance), v, side);
-        r.sectors = sectors_between(slice, min(min(theta, behind), min(before, after)),
-                                    max(max(theta, behind), max(before, after)));
+    ScreenSample a = scan.last;
+    ScreenSample b = a;
+    Covered r = Covered(a, vec2(1.0, 0.0), 0.0, 0u);
+    float until = 1.0;
+    if (k < scan.steps) {
+        b.s = mix(scan.pixel, 1.0, spacing(float(k), scan.steps, scan.jitter));
+        b.pixel = ivec2(scan.origin.xy + scan.way * b.s);
+        if (b.pixel == a.pixel) {
+            scan.last = b;
+            return r;
+        }
+        b.plane = texelFetch(ssdo_planes, b.pixel, 0);
+        // A pixel is known at its middle: the edge may be before the sample of `a`, or a pixel behind that of `b`.
+        float latest = b.s + scan.pixel;
+        vec2 p = scan.origin.xy + scan.way * scan.since;
+        vec2 p_latest = scan.origin.xy + scan.way * latest;
+        float gap = plane_at(a, p) - plane_at(b, p);
+        float gap_latest = plane_at(a, p_latest) - plane_at(b, p_latest);
+        // A receiver on the edge itself is on both planes, to rounding.
+        float least = 0.1 * nearness_of_pixel(scan.origin);
+        bool at_edge = a.pixel == ivec2(scan.origin.xy) && abs(gap) < least && abs(gap_latest) > least;
+        gap = at_edge ? 0.0 : gap;
+        bool meet = (at_edge || gap * gap_latest < 0.0) && min(a.plane.x, b.plane.x) > 0.5 * NOTHING;
+        until = meet ? mix(scan.since, latest, gap / (gap - gap_latest)) : max(scan.since, sqr(0.5 * (sqrt(a.s) + sqrt(b.s))));
     }
+    if (a.plane.x > 0.5 * NOTHING && a.pixel != ivec2(scan.origin.xy)) {
+        vec2 d = slice_toward(scan, a, a.s);
+        float far = length(d);
+        r.direction = d / max(far, 1e-30);
+        r.distance = view.orthographic > 0.5 ? far : far / plane_near(a.plane, a.pixel, scan.origin.xy + scan.way * a.s);
+        // What begins at the receiver itself begins at its horizon.
+        int before = scan.since > 0.0 ? sectors_below(slice, unit(slice_toward(scan, a, scan.since)))
+                                      : scan.across.y > 0.0 ? int(SECTORS) : 0;
+        int after = sectors_below(slice, unit(slice_toward(scan, a, until)));
+        int behind = sectors_below(slice, unit(d - vec2(scan.thickness * far, 0.0)));
+        r.sectors = bits_below(max(max(before, after), behind)) & ~bits_below(min(min(before, after), behind));
+    }
+    scan.last = b;
+    scan.since = until;
     return r;
 }

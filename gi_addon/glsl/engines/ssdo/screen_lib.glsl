@@ -38,14 +38,22 @@ float ray_length_on_screen(vec3 start_ws, vec3 direction_ws, float reach)
 }
 
 // Where along its way, in [0, 1], a march tests for the k-th time: finer near its start, and the end itself at last.
-float spacing(int k, int steps, float jitter) { return sqr((float(k) + jitter) / (float(steps) - 1.0 + jitter)); }
+float spacing(float k, int steps, float jitter) { return sqr((k + jitter) / (float(steps) - 1.0 + jitter)); }
 
-// Whether the surface of `pixel` shows its front to a point at screen position `at`: the point is in front of its plane, by a
-// tenth of a pixel's width at least. Less is the rounding of normals, and would make planes light themselves.
+// Nearness that one pixel's width of depth makes at a screen position, and the rounding of nearness there.
+float nearness_of_pixel(vec3 at) { return view.pixel_size * (view.orthographic > 0.5 ? 1.0 : at.z); }
+float nearness_rounding(vec3 at) { return 1e-6 * (view.orthographic > 0.5 ? view.scene_radius : at.z); }
+
+// Whether the surface of `pixel` shows its front to a point at screen position `at`: the point is in front of its plane, by more
+// than rounding, which would make planes light themselves. Normals are kept to 2⁻¹⁵, which tilts a plane of slope tan φ by
+// (1 + tan² φ) of that per pixel of distance.
 bool faces(vec4 plane, ivec2 pixel, vec3 at)
 {
-    float tenth = 0.1 * view.pixel_size * (view.orthographic > 0.5 ? 1.0 : at.z);
-    return at.z > plane.x + dot(plane.yz, at.xy - (vec2(pixel) + 0.5)) + tenth;
+    vec2 away = at.xy - (vec2(pixel) + 0.5);
+    float width = nearness_of_pixel(at);
+    vec2 slope = plane.yz / width;
+    float rounding = nearness_rounding(at) + width * (1.0 + dot(slope, slope)) * length(away) / 32768.0;
+    return at.z > plane.x + dot(plane.yz, away) + rounding;
 }
 
 // The surface of `pixel` continued to pixel position `p`, q there. A plane that is looked along would run to the eye or the

@@ -21,7 +21,7 @@ Traced trace(vec3 start_ws, vec3 direction_ws, float reach, float thickness)
     vec3 a = screen_from_ws(start_ws);
     vec3 b = screen_from_ws(start_ws + direction_ws * far);
     bool perspective = view.orthographic < 0.5;
-    float rounding = 1e-6 * (perspective ? a.z : view.scene_radius);
+    float rounding = nearness_rounding(a);
     vec2 way = b.xy - a.xy;
     // Where the ray crosses columns and rows: far away in s for a ray that does not.
     vec2 per_way = 1.0 / mix(way, vec2(1e-6), lessThan(abs(way), vec2(1e-6)));

@@ -23,18 +23,16 @@ float cone_spread(int count)
 
 float cone_phase() { return view.subframes > 1u ? sobol_2d(view.subframe, 41u).x : 0.0; }
 
-// Direction `i` of `count` about +z: the next points of the R2 sequence in each sub-frame (M. Roberts, "The Unreasonable
-// Effectiveness of Quasirandom Sequences", 2018: multiples of 1/g and 1/g², g³ = g + 1, here in units of 2^−32), whose every run
-// is even. `turned`: 2 × 2 neighbours have runs one after another, and the tent of passes/smooth_blocks_frag.glsl weighs the
+// Direction `i` of `count` about +z: the next points of the R2 sequence in each sub-frame. `turned`: 2 × 2 neighbours have runs one after another, and the tent of passes/smooth_blocks_frag.glsl weighs the
 // four alike wherever it stands.
 vec3 cone_direction(int i, int count, bool turned)
 {
     uvec2 place = uvec2(gl_FragCoord.xy) & 1u;
     uint run = turned ? place.x + 2u * place.y : 0u;
     uint j = (run * uint(cone_sets) + view.subframe) * uint(count) + uint(i);
-    float r2 = unit_float(j * 3242174889u + 0x80000000u);
-    float phi = TAU * unit_float(j * 2447445414u + 0x80000000u);
-    return vec3(sqrt(r2) * vec2(cos(phi), sin(phi)), sqrt(1.0 - r2));
+    vec2 u = r2_sequence(j);
+    float phi = TAU * u.y;
+    return vec3(sqrt(u.x) * vec2(cos(phi), sin(phi)), sqrt(1.0 - u.x));
 }
 
 // The cone from a surface at `position_ws` along `direction`, `reach` m far.

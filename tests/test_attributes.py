@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What materials ask of the object they are on, and objects that are a volume, against Cycles."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from test_materials import agree, cube, material_of, plane
+
+from gi_addon.materials import compile_surface
+
+pytestmark = pytest.mark.blender
+COLORS = ((0.8, 0.1, 0.1), (0.1, 0.7, 0.2), (0.1, 0.2, 0.8))
+
+
+def coloured_by(bpy, kind, name):
+    """A diffuse material whose colour is an attribute."""
+
+    def connect(tree, output):
+        attribute, shader = tree.nodes.new("ShaderNodeAttribute"), tree.nodes.new("ShaderNodeBsdfDiffuse")
+        attribute.attribute_type, attribute.attribute_name = kind, name
+        tree.links.new(attribute.outputs["Color"], shader.inputs["Color"])
+        tree.links.new(shader.outputs[0], output.inputs["Surface"])
+
+    return material_of(bpy, connect)
+
+
+@pytest.mark.parametrize("name", ["tint", "color"])
+def test_an_attribute_of_the_object_is_its_custom_or_own_property(blender, gl, name):
+    """One material on three objects, with a colour of each one's own; one program serves all."""
+    from gi_addon.host.sync import SceneSync
+
+    scene = plane(blender)
+    material = coloured_by(blender, "OBJECT", name)
+    for x, color in zip((-1.2, 0.0, 1.2), COLORS, strict=True):
+        obj = cube(blender, scene, (x, 0.0, 0.5), 0.9, material)
+        obj["tint"], obj.color = color, (*color, 1.0)
+    agree(f"object {name}", scene, ("Diffuse Color",))
+    worn = [m for m in SceneSync().read(blender.context.evaluated_depsgraph_get()).materials if m.name == material.name]
+    assert len(worn) == 3 and len({compile_surface(m.graph).glsl for m in worn}) == 1
+
+
+def test_an_instance_takes_the_attribute_of_its_instancer_and_the_scene_gives_its_own(blender, gl):
+    bpy = blender
+    scene = plane(bpy)
+    child = cube(bpy, scene, (0.0, 0.0, 0.0), 0.5, coloured_by(bpy, "INSTANCER", "tint"))
+    bpy.ops.mesh.primitive_plane_add(size=2.0, location=(0.0, 0.0, 0.3))
+    parent = bpy.context.object
+    parent["tint"], parent.instance_type, parent.show_instancer_for_render = COLORS[1], "VERTS", False
+    child.parent = parent
+    scene["tint"] = COLORS[2]
+    cube(bpy, scene, (0.0, 0.0, 0.5), 0.6, coloured_by(bpy, "VIEW_LAYER", "tint"))
+    agree("instancer", scene, ("Diffuse Color",))
+
+
+def test_pointiness_is_cycles(blender, gl):
+    """Sharp, hollow and flat places of a bent grid."""
+    bpy = blender
+    scene = plane(bpy)
+    bpy.ops.mesh.primitive_monkey_add(size=2.0, location=(0.0, 0.0, 1.0))
+
+    def connect(tree, output):
+        geometry, spread = tree.nodes.new("ShaderNodeNewGeometry"), tree.nodes.new("ShaderNodeMapRange")
+        shader = tree.nodes.new("ShaderNodeBsdfDiffuse")
+        spread.inputs["From Min"].default_value, spread.inputs["From Max"].default_value = 0.4, 0.6
+        tree.links.new(geometry.outputs["Pointiness"], spread.inputs["Value"])
+        tree.links.new(spread.outputs[0], shader.inputs["Color"])
+        tree.links.new(shader.outputs[0], output.inputs["Surface"])
+
+    bpy.context.object.data.materials.append(material_of(bpy, connect))
+    test, _ = agree("pointiness", scene, ("Diffuse Color",), rel_mse=0.01)
+    assert np.abs(test["Diffuse Color"] - 0.5).max() > 0.4, "no contrast: nothing was tested"
+
+
+@pytest.mark.parametrize("kind", ["ShaderNodeVolumeScatter", "ShaderNodeVolumeAbsorption"])
+def test_a_cube_of_a_volume_scatters_and_absorbs_within_itself(blender, gl, kind):
+    """Its hull is not seen; what is behind it shines through, and it shades the ground."""
+
+    def connect(tree, output):
+        volume = tree.nodes.new(kind)
+        volume.inputs["Density"].default_value = 0.8
+        volume.inputs["Color"].default_value = (0.9, 0.6, 0.3, 1.0)
+        tree.links.new(volume.outputs[0], output.inputs["Volume"])
+
+    scene = plane(blender)
+    cube(blender, scene, (0.0, 0.0, 0.75), 1.5, material_of(blender, connect))
+    # Cycles' first bounce inside the volume is the light scattered once.
+    agree(kind, scene, ("Combined",), samples=256, bounces=1, rel_mse=0.03, gain=0.03)
