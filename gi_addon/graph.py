@@ -322,7 +322,8 @@ def plan(passes: Iterable[Pass], facts: Facts, outputs: Mapping[str, str]) -> Pl
             continue
         writes = [w for w in task.writes if w.name in wanted]
         if writes:
-            writes = [w for w in task.writes if w in writes or getattr(w, "scratch", False)]
+            own = [w for w in task.writes if getattr(w, "scratch", False) and w.name not in missing]
+            writes = [w for w in task.writes if w in writes or w in own]
         else:
             names = [w.name for w in task.writes]
             skipped.append((task, "nothing that runs reads " + ", ".join(names)))

@@ -204,7 +204,7 @@ class SSDOSettings:
         soft_high=100.0, unit="m", higher="light from farther away", lower="finer near by, dark rooms",
     )  # fmt: skip
     thickness: float = _setting(
-        0.5, "Thickness", "How thick what the screen shows is taken to be, as a share of its distance from the receiver",
+        0.25, "Thickness", "How thick what the screen shows is taken to be, as a share of its distance from the receiver",
         low=0.01, high=10.0, higher="fewer leaks behind things", lower="light passes behind thin things",
     )  # fmt: skip
     occlusion: str = _setting(
@@ -249,7 +249,7 @@ class VCTSettings:
         higher="thinner walls hold, finer bounce light", lower="faster, less memory",
     )  # fmt: skip
     cones: int = _setting(
-        6, "Cones", "Cones traced from each point into its hemisphere and sub-frame", low=1, high=64,
+        12, "Cones", "Cones traced from each point into its hemisphere and sub-frame", low=1, high=64,
         higher="finer directions, sharper contact", lower="faster, blurrier",
     )  # fmt: skip
     shadow_cones: bool = _setting(
