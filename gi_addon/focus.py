@@ -3,7 +3,8 @@
 
 A ground of a kilometre under a chair leaves one cell, or one texel of the sun's map, for the chair. Such a backdrop
 receives shadows and bounced light but needs no cells of its own far from everything else: what it does to the rest it does
-from near by. Of a plane at distance h, what lies farther than R from its nearest point has the view factor h²/(h² + R²).
+from near by. Of a plane at distance h, what lies farther than R from its nearest point has the view factor h²/(h² + R²) for a
+receiver along it, and ½ h/√(h² + R²) for one across it: that share of the ground's bounced light is lost.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from .scene import Scene
 # How many times larger than all the rest a backdrop is. Below, the region would hardly be smaller than the whole.
 _LARGER = 8.0
 # The region reaches this many diagonals of the rest beyond it, and this many times the distance from the rest's middle to the
-# nearest backdrop: view factor 1/26.
+# nearest backdrop: view factor 1/26 along it, at most 1/10 across (of ½).
 _AROUND = 2.0
 _AROUND_DISTANCES = 5.0
 # What is not this much smaller than everything is not worth leaving anything out for.

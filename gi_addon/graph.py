@@ -123,11 +123,12 @@ class Pass:
 
     ``rate`` is ``static`` (run only when stale: a stamp in ``depends``, a setting in ``settings`` or a static input has
     changed) or ``subframe`` (every time; ``Planned.stale`` then tells what of it is still good). ``shaders`` maps a key to
-    stages (see ``GL.program``). ``figure`` names the paper's box.
+    stages (see ``GL.program``). ``figure`` names the paper's box; ``source`` says where its light is from if that is not plain.
     """
 
     title: ClassVar[str] = ""
     figure: ClassVar[str] = ""
+    source: ClassVar[str] = ""
     reads: ClassVar[tuple[str | Optional, ...]] = ()
     writes: ClassVar[tuple[Texture | Buffer, ...]] = ()
     uniforms: ClassVar[tuple[Uniform, ...]] = ()
@@ -321,7 +322,8 @@ def plan(passes: Iterable[Pass], facts: Facts, outputs: Mapping[str, str]) -> Pl
             continue
         writes = [w for w in task.writes if w.name in wanted]
         if writes:
-            writes = [w for w in task.writes if w in writes or getattr(w, "scratch", False)]
+            own = [w for w in task.writes if getattr(w, "scratch", False) and w.name not in missing]
+            writes = [w for w in task.writes if w in writes or w in own]
         else:
             names = [w.name for w in task.writes]
             skipped.append((task, "nothing that runs reads " + ", ".join(names)))

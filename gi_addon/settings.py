@@ -175,8 +175,10 @@ class LPVSettings:
         high=512, higher="reaches farther", lower="dark far from lit surfaces; slower than 0 all the same",
     )  # fmt: skip
     directions: str = _setting(
-        "72", "Directions", "Directions that light travels in through the grid",
-        choices=(("48", "48", "Faster; small bright patches may show as rays"), ("72", "72", "Smoother")),
+        "AUTO", "Directions", "Directions that light travels in through the grid; too few for a fine grid show as rays",
+        choices=(("AUTO", "Automatic", "72 up to 32 cells, 144 up to 64, 288 for more"),
+                 ("48", "48", "Fastest"), ("72", "72", "For 32 cells"), ("144", "144", "For 64 cells"),
+                 ("288", "288", "For 128 cells")),
     )  # fmt: skip
     glossy_rays: int = _setting(
         2, "Glossy Rays", "Rays through the grid per pixel and sub-frame for glossy reflections", low=1, high=64,
@@ -202,7 +204,7 @@ class SSDOSettings:
         soft_high=100.0, unit="m", higher="light from farther away", lower="finer near by, dark rooms",
     )  # fmt: skip
     thickness: float = _setting(
-        0.5, "Thickness", "How thick what the screen shows is taken to be, as a share of its distance from the receiver",
+        0.25, "Thickness", "How thick what the screen shows is taken to be, as a share of its distance from the receiver",
         low=0.01, high=10.0, higher="fewer leaks behind things", lower="light passes behind thin things",
     )  # fmt: skip
     occlusion: str = _setting(
@@ -247,7 +249,7 @@ class VCTSettings:
         higher="thinner walls hold, finer bounce light", lower="faster, less memory",
     )  # fmt: skip
     cones: int = _setting(
-        6, "Cones", "Cones traced from each point into its hemisphere and sub-frame", low=1, high=64,
+        12, "Cones", "Cones traced from each point into its hemisphere and sub-frame", low=1, high=64,
         higher="finer directions, sharper contact", lower="faster, blurrier",
     )  # fmt: skip
     shadow_cones: bool = _setting(

@@ -5,7 +5,7 @@
 per panorama and channel six numbers of L = S (1 + A e^(B/(cosθ + .01))) (1 + C e^(Dγ) + E cos²γ) by Levenberg's and
 Marquardt's method, least in relative error; θ is the angle from the zenith, γ that from the sun (R. Perez et al., "All-Weather
 Model for Sky Luminance Distribution", Solar Energy 50, 1993). Blender's sky drops in its last degree above the horizon, and goes
-on below it as at it: a seventh number is what is left of L there.
+on below it as at it: there only γ matters, and four numbers more are the weights of 1, cosγ, cos²γ and e^(−3γ).
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ sys.path.insert(0, str(ROOT))
 TURBIDITIES = (1.0, 2.0, 3.0, 4.0, 6.0, 10.0)
 ELEVATIONS = (0.0, 4.0, 10.0, 18.0, 28.0, 42.0, 60.0, 90.0)  # degrees
 ALBEDOS = (0.0, 1.0)
-SIZE = (48, 48)
+SIZE = (36, 36)
 HORIZON = 1e-3  # Blender's least cosθ
 START = (1.0, -1.0, -0.3, 3.0, -3.0, 0.3)
 
@@ -47,7 +47,7 @@ def angles(elevation: float) -> tuple[np.ndarray, np.ndarray]:
 
 def fit(radiance: np.ndarray, cos: np.ndarray, gamma: np.ndarray) -> tuple[np.ndarray, float]:
     """(numbers, root mean square of the relative error above the horizon) for one channel."""
-    from gi_addon.materials.hosek import HOSEK_SLANT
+    from gi_addon.materials.hosek import HOSEK_SLANT, horizon_basis
     from gi_addon.materials.sky import perez
 
     scale = max(float(radiance.mean()), 1e-12)
@@ -59,7 +59,7 @@ def fit(radiance: np.ndarray, cos: np.ndarray, gamma: np.ndarray) -> tuple[np.nd
 
     best = np.array(START)
     error, damping = residual(best), 1e-2
-    for _ in range(100):
+    for _ in range(60):
         step = 1e-5 * (1.0 + np.abs(best))
         jacobian = np.stack([(residual(best + step * d) - error) / step[k] for k, d in enumerate(np.eye(6))], axis=1)
         normal = jacobian.T @ jacobian
@@ -72,8 +72,8 @@ def fit(radiance: np.ndarray, cos: np.ndarray, gamma: np.ndarray) -> tuple[np.nd
         else:
             damping = min(damping * 4.0, 1e9)
     below = cos <= HORIZON
-    drop = float(np.mean(radiance[below]) / (scale * np.mean(perez(best, 1.0 / (cos + HOSEK_SLANT), gamma)[below])))
-    numbers = np.array([best[0] * scale, *best[1:], drop])
+    ground = np.linalg.lstsq(horizon_basis(gamma[below]), radiance[below], rcond=None)[0]
+    numbers = np.array([best[0] * scale, *best[1:], *ground])
     return numbers, float(np.sqrt(np.sum(error**2) / np.count_nonzero(weight)))
 
 
@@ -99,7 +99,7 @@ def main() -> None:
     scene.collection.objects.link(camera)
     scene.camera = camera
     scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = *SIZE, 100
-    numbers = np.zeros((len(TURBIDITIES), len(ELEVATIONS), len(ALBEDOS), 3, 7))
+    numbers = np.zeros((len(TURBIDITIES), len(ELEVATIONS), len(ALBEDOS), 3, 10))
     errors = np.zeros(numbers.shape[:4])
     for i, turbidity in enumerate(TURBIDITIES):
         for j, elevation in enumerate(ELEVATIONS):
@@ -115,10 +115,10 @@ def write(numbers: np.ndarray) -> None:
     """The numbers as a module."""
     lines = [
         "# SPDX-License-Identifier: GPL-3.0-or-later",
-        '"""Written by scripts/fit_sky.py: rows of (S, A, B, C, D, E, drop) by turbidity, elevation, albedo and channel."""',
+        '"""Written by scripts/fit_sky.py: rows by turbidity, elevation, albedo and channel, see hosek.py."""',
         "", f"TURBIDITIES = {TURBIDITIES}", f"ELEVATIONS = {ELEVATIONS}  # degrees", f"ALBEDOS = {ALBEDOS}", "NUMBERS = (",
     ]  # fmt: skip
-    lines += ["    (" + ", ".join(f"{v:.5g}" for v in row) + ")," for row in numbers.reshape(-1, 7)]
+    lines += ["    (" + ", ".join(f"{v:.5g}" for v in row) + ")," for row in numbers.reshape(-1, 10)]
     (ROOT / "gi_addon" / "materials" / "hosek_numbers.py").write_text("\n".join([*lines, ")", ""]))
 
 

@@ -13,7 +13,8 @@ from test_blender import cycles, diffuse, put, quartet, tree_of
 from gi_addon.compare import scenes
 from gi_addon.compare.metrics import score
 from gi_addon.frame import lens_point
-from gi_addon.scene import Camera
+from gi_addon.materials import mean_emission
+from gi_addon.scene import Camera, Link, Node, ShaderGraph
 
 pytestmark = pytest.mark.blender
 SIZE = (64, 36)
@@ -352,3 +353,12 @@ def test_metals_by_index_and_by_colour_reflect_as_in_cycles(blender, gl):
         bpy.ops.object.shade_smooth()
         bpy.context.object.data.materials.append(material_of(bpy, connect))
     agree("metal", scene, ("Glossy Color",), rel_mse=0.01, gain=0.02)
+
+
+def test_a_checkers_mean_emission_is_the_mean_of_its_colours():
+    """What a lamp of emissive checkers casts has their mean colour, not grey."""
+    nodes = (
+        Node("TEX_CHECKER", "Checker", {"Color1": (1.0, 0.1, 0.05, 1.0), "Color2": (0.0, 0.0, 0.0, 1.0), "Scale": 4.0}),
+        Node("EMISSION", "Emission", {"Color": Link(0, "Color"), "Strength": 5.0}),
+    )
+    np.testing.assert_allclose(mean_emission(ShaderGraph(nodes, Link(1, "Emission")), []), (2.5, 0.25, 0.125))

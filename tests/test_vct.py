@@ -8,6 +8,7 @@ import pytest
 from conftest import make
 
 from gi_addon.compare import scenes
+from gi_addon.compare.closed_forms import polygon_form_factor
 from gi_addon.gl import GL, shared
 from gi_addon.outputs import OUTPUTS
 from gi_addon.passes.voxels import VoxelGrid, voxel_grid
@@ -83,15 +84,14 @@ def test_light_does_not_depend_on_the_shadow_maps_resolution(gl):
     assert max(means) / min(means) <= 1.02
 
 
-def test_light_hardly_depends_on_the_grids_resolution(gl):
-    """Stability test 13 asks for a drift of the mean ≤ 3 %; over 32 … 96 cells it is 4.5 %: walls look half a cell thicker
-    than they are."""
+def test_light_does_not_depend_on_the_grids_resolution(gl):
+    """Stability test 13: drift of the mean ≤ 3 % from 16 to 64 cells."""
     scene = scenes.cornell(blocks=False)
     means = [
         vct(scene, "Diffuse Indirect", samples=8, vct__resolution=r).passes["Diffuse Indirect"].mean()
-        for r in (32, 64, 96)
+        for r in (16, 32, 64)
     ]
-    assert max(means) / min(means) <= 1.05
+    assert max(means) / min(means) <= 1.03
 
 
 def test_a_uniform_enclosure_returns_its_radiance(gl):
@@ -167,16 +167,17 @@ def test_a_wall_two_cells_thick_keeps_light_out(gl, degrees):
     assert mean(0.75) <= 0.01 * mean(-0.75)
 
 
-def test_an_opaque_wall_stays_opaque_at_every_mip(gl):
-    """Its depth across is that of a whole surface in one cell of every column: transmittance e^−5."""
+def test_a_wall_covers_the_faces_of_its_cells_at_every_mip(gl):
+    """A wall across the grid covers all of its cells' faces, in the cells and in each mip: alpha 1 of the side it faces."""
     wall = np.array([[[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]]])
     b = scenes.SceneBuilder().quads(wall, scenes.diffuse((0.5,) * 3))
     b.light(scenes.sun_light((0, 1, 0), 1.0))
     scene = b.build(scenes.perspective((0, -4, 0), (0, 0, 0), 0.8))
     for level in range(3):
-        _, opacity = volume(scene, "vct.opacity", level, vct__resolution=32)
-        inner = opacity[1:-1, :, 1:-1, 1].max(axis=1)
-        assert np.exp(-5.0 * inner).max() <= 0.01
+        grid, atlas = volume(scene, "vct.radiance", level, vct__resolution=32)
+        width, depth = grid.size[0] >> level, grid.size[2] >> level
+        part = atlas[depth : 2 * depth, :, width:]  # −y
+        np.testing.assert_allclose(part[1:-1, :, 1:-1, 3].max(axis=1), 1.0, atol=1e-3)
 
 
 def test_a_wall_red_on_one_side_does_not_bleed_through(gl):
@@ -199,16 +200,47 @@ def test_a_wall_red_on_one_side_does_not_bleed_through(gl):
 
 
 def test_empty_cells_hold_nothing(gl):
-    """No light and no depth, at any mip: 0, not 0/0."""
+    """No light, at any mip: 0, not 0/0."""
     b = scenes.SceneBuilder().quads(scenes.box_quads((-1, -1, -1), (1, 1, 1)), scenes.diffuse((0.5,) * 3))
     b.light(scenes.point_light((0, -3, 0), 10.0))
     scene = b.build(scenes.perspective((0, -4, 0), (0, 0, 0), 0.8))
     for level in range(2):
-        _, opacity = volume(scene, "vct.opacity", level, vct__resolution=32)
-        _, atlas = volume(scene, "vct.radiance", level, vct__resolution=32)
-        assert np.isfinite(atlas).all() and np.isfinite(opacity).all()
-        m = opacity.shape[0] // 2
-        assert (opacity[m - 1 : m + 1, m - 1 : m + 1, m - 1 : m + 1] == 0).all()
+        grid, atlas = volume(scene, "vct.radiance", level, vct__resolution=32)
+        assert np.isfinite(atlas).all()
+        m = (grid.size[0] >> level) // 2
+        for z in range(3):
+            middle = atlas[m - 1 + z * 2 * m : m + 1 + z * 2 * m, m - 1 : m + 1]
+            assert (middle[:, :, m - 1 : m + 1] == 0).all() and (middle[:, :, 3 * m - 1 : 3 * m + 1] == 0).all()
+
+
+@pytest.mark.parametrize(("cells", "up", "within"), [(1.0, True, 0.06), (1.0, False, 0.06), (2.0, True, 0.06), (0.5, False, 0.3)])
+def test_a_lamp_close_to_a_floor_lights_it_and_hides_what_is_below(gl, cells, up, within):
+    """An emissive square a cell or two above a floor, whichever way it faces: what a ceiling receives from the floor around it is
+    ∫ ρ L F(x → lamp) cosθ cosθ'/(π d²) dA over what the lamp leaves visible, ± 6 %; nearer than a cell, where lamp and floor
+    share cells, ± 30 %."""
+    h = cells * 4.0 / 63.0
+    lamp = np.array([[-0.25, -0.25, h], [0.25, -0.25, h], [0.25, 0.25, h], [-0.25, 0.25, h]])
+    b = scenes.SceneBuilder()
+    b.quads(np.array([[[-2.0, -2, 0], [2, -2, 0], [2, 2, 0], [-2, 2, 0]]]), scenes.diffuse((0.8,) * 3))
+    b.quads((lamp if up else lamp[::-1])[None], scenes.emissive((1, 1, 1), 10.0))
+    b.quads(np.array([[[-0.5, -0.5, 1.5], [-0.5, 0.5, 1.5], [0.5, 0.5, 1.5], [0.5, -0.5, 1.5]]]), scenes.diffuse((0.5,) * 3))
+    scene = b.build(scenes.perspective((0, 0, 0.9), (0, 0.001, 1.5), 0.9))
+    image = vct(scene, "Diffuse Indirect", samples=16, resolution=(32, 18)).passes["Diffuse Indirect"]
+    edge = np.sinh(np.linspace(-3.0, 3.0, 161))
+    edge *= 2.0 / edge[-1]
+    middle, width = (edge[1:] + edge[:-1]) / 2, np.diff(edge)
+    x, y = np.meshgrid(middle, middle)
+    floor = np.stack([x, y, 0 * x], -1).reshape(-1, 3)
+    radiosity = 0.8 * np.pi * 10.0 * polygon_form_factor(floor, np.broadcast_to([0.0, 0, 1], floor.shape), lamp)
+    flux = radiosity * np.outer(width, width).ravel()
+    exact = []
+    for px, py in ((px, py) for px in np.linspace(-0.2, 0.2, 3) for py in np.linspace(-0.12, 0.12, 3)):
+        to = np.array([px, py, 1.5]) - floor
+        d2 = (to * to).sum(-1)
+        over = floor[:, :2] * (1 - h / 1.5) + np.array([px, py]) * (h / 1.5)
+        seen = (np.abs(over) >= 0.25).any(-1)
+        exact.append((flux * seen * to[:, 2] ** 2 / d2**2).sum() / np.pi**2)
+    assert image.mean() == pytest.approx(np.mean(exact), rel=within)
 
 
 # --- the rest of the stability suite --------------------------------------------------------------------------------------

@@ -21,7 +21,7 @@ from gi_addon.settings import Settings
 
 class _Reader(Pass):
     title = "Voxel Reader"
-    reads = ("voxels.area", "voxels.albedo", "voxels.normal")
+    reads = ("voxels.sheets", "voxels.kinds", "voxels.albedo")
     writes = (Texture("indirect.diffuse", "indirect_diffuse", "nothing, for the test", "rgba32f", lambda f: f.resolution),)
 
     def run(self, frame, planned):
@@ -59,9 +59,13 @@ def voxels(gl, monkeypatch):
             out = {}
             for name in reader.reads:
                 texture = renderer.frame.resources[name]
-                dtype = {"f1": np.uint8, "f2": np.float16}[texture.dtype]
-                out[name.split(".")[1]] = np.frombuffer(texture.read(), dtype).reshape(z, y, x, 4).astype("f4")
+                dtype = {"f1": np.uint8, "f2": np.float16, "nu2": np.uint16}[texture.dtype]
+                data = np.frombuffer(texture.read(alignment=1), dtype)
+                out[name.split(".")[1]] = data.reshape(*texture.size[::-1], -1).astype("f4")
             out["albedo"] /= 255.0
+            out["opacity"] = out["kinds"][..., 1] / 255.0
+            # (axis, side, z, y, x, [slope u, slope v, height, squares])
+            out["sheets"] = out["sheets"].reshape(3, z, y, 2, x, 4).transpose(0, 3, 1, 2, 4, 5)
             renderer.close()
             return grid, out, ran
 
@@ -130,7 +134,7 @@ def test_no_thin_or_turned_triangle_leaves_a_hole(voxels):
     """Every cell of the 6-separating voxelization of 1000 random thin triangles is taken."""
     corners = _thin(1000, 1).astype("f4")
     grid, out, _ = voxels(_scene((triangles(corners), scenes.diffuse((0.5,) * 3))), 48)
-    taken = out["albedo"][..., 3] > 0
+    taken = out["opacity"] > 0
     local = (corners.astype("f8") - grid.low) / grid.cell
     needed = {cell for t in local for cell in crosshair_cells(t)}
     assert len(needed) > 5000
@@ -144,27 +148,69 @@ def test_no_thin_or_turned_triangle_leaves_a_hole(voxels):
     assert not (taken & ~near).any()
 
 
-def test_area_is_the_triangles_own(voxels):
-    """Σ over cells of the projected area is Σ A |n| over triangles, to a thousandth: cells cut them without overlap."""
-    corners = _thin(60, 2)
-    grid, out, _ = voxels(_scene((triangles(corners), scenes.diffuse((0.5,) * 3))), 32)
-    total = out["area"][..., :3].sum(axis=(0, 1, 2), dtype="f8") * grid.cell**2
-    exact = np.abs(0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])).sum(axis=0)
-    np.testing.assert_allclose(total, exact, rtol=1e-3)
-
-
-@pytest.mark.parametrize("degrees", [0, 15, 45])
-def test_a_wall_is_one_whole_face_in_every_column(voxels, degrees):
-    """Seen along any axis that it faces, each column of cells holds exactly one cell face of a large wall."""
+def _plane(degrees: float, tilt: float = 0.0) -> tuple[scenes.Mesh, np.ndarray]:
+    """A large square through the origin and its normal: along y, tilted about x and turned about z."""
     mesh = scenes.mesh_from_quads(np.array([[[-3, 0, -3], [3, 0, -3], [3, 0, 3], [-3, 0, 3]]]))
-    a = np.radians(degrees)
-    turn = np.array([[np.cos(a), np.sin(a), 0], [-np.sin(a), np.cos(a), 0], [0, 0, 1]])
-    mesh.positions = (mesh.positions @ turn).astype("f4")
+    a, b = np.radians([degrees, tilt])
+    turn = np.array([[np.cos(a), -np.sin(a), 0], [np.sin(a), np.cos(a), 0], [0, 0, 1]])
+    turn = turn @ np.array([[1, 0, 0], [0, np.cos(b), -np.sin(b)], [0, np.sin(b), np.cos(b)]])
+    mesh.positions = (mesh.positions @ turn.T).astype("f4")
     mesh.__post_init__()
+    return mesh, turn @ np.array([0.0, 1.0, 0.0])
+
+
+@pytest.mark.parametrize(("degrees", "tilt"), [(0, 0), (15, 10), (40, 0), (-30, -20)])
+def test_a_sheet_lies_on_its_surface(voxels, degrees, tilt):
+    """Every sheet of a plane is that plane, to a thousandth of a cell, in every cell it passes through."""
+    mesh, n = _plane(degrees, tilt)
+    grid, out, _ = voxels(_scene((mesh, scenes.diffuse((0.5,) * 3))), 32)
+    z, y, x = np.nonzero(out["opacity"] > 0)
+    middle = (np.stack([x, y, z], -1) + 0.5) * grid.cell + grid.low
+    sheets = out["sheets"][1][:, z, y, x] / 65535.0
+    sheet = np.where(sheets[0, :, 3:] > 0, sheets[0], sheets[1])
+    assert (sheet[:, 3] > 0).all()  # all along y
+    np.testing.assert_allclose(sheet[:, 0] * 2 - 1, n[2] / n[1], atol=2e-3)
+    np.testing.assert_allclose(sheet[:, 1] * 2 - 1, n[0] / n[1], atol=2e-3)
+    np.testing.assert_allclose(sheet[:, 2] * 3 - 1.5, -(middle @ n) / n[1] / grid.cell, atol=2e-3)
+
+
+@pytest.mark.parametrize("degrees", [0, 15, 40])
+def test_a_wall_covers_every_column_wholly(voxels, degrees):
+    """Looked at along the axis that it faces most, a large wall covers all 16 squares of each column of cells."""
+    mesh, _ = _plane(degrees)
     _, out, _ = voxels(_scene((mesh, scenes.diffuse((0.5,) * 3))), 32)
-    columns = out["area"][..., 1].sum(axis=1)  # along y
-    inner = columns[4:-4, 4:-4] if degrees == 0 else columns[4:-4, columns.shape[1] // 2 - 6 : columns.shape[1] // 2 + 6]
-    np.testing.assert_allclose(inner, 1.0, atol=2e-3)
+    squares = out["sheets"][1, ..., 3].astype("u4")
+    columns = np.bitwise_or.reduce(squares, axis=(0, 2))  # over sides and y
+    middle = columns.shape[1] // 2
+    assert (columns[4:-4, middle - 6 : middle + 6] == 0xFFFF).all()
+
+
+def test_squares_are_those_that_a_triangle_covers(voxels):
+    """A triangle across a few cells covers the quarter-cell squares that it meets and no others."""
+    frame = np.array([[[-1, -1, -1], [-1, -1, -0.999], [-1, -0.999, -1]], [[1, 1, 1], [1, 1, 0.999], [1, 0.999, 1]]])
+    corner = np.array([[-0.31, 0.12, 0.03], [0.27, -0.08, 0.03], [0.05, 0.33, 0.03]])
+    grid, out, _ = voxels(_scene((triangles(np.concatenate([frame, corner[None]])), scenes.diffuse((0.5,) * 3))), 16)
+    layer = int((0.03 - grid.low[2]) / grid.cell)
+    squares = out["sheets"][2, :, layer, ..., 3].astype("u4")
+    squares = squares[0] | squares[1]
+    n = 8  # points a square's side
+    at = (np.arange(4 * n * grid.size[0]) + 0.5) / (4 * n)
+    gx, gy = np.meshgrid(at * grid.cell + grid.low[0], at * grid.cell + grid.low[1])
+    inside = np.ones(gx.shape, bool)
+    for i in range(3):
+        d, e = corner[(i + 1) % 3] - corner[i], corner[i]
+        inside &= d[0] * (gy - e[1]) - d[1] * (gx - e[0]) > 0
+    met = inside.reshape(grid.size[0] * 4, n, grid.size[0] * 4, n).any(axis=(1, 3))
+    k = np.arange(16)
+    taken = (squares[..., None] >> k & 1).reshape(*squares.shape, 4, 4).transpose(0, 2, 1, 3).reshape(met.shape) > 0
+    assert met.sum() > 100
+    assert not (met & ~taken).any()
+    # What is taken beyond that is only grazed: between the points.
+    near = np.zeros_like(met)
+    for dy in (-1, 0, 1):
+        for dx in (-1, 0, 1):
+            near |= np.roll(met, (dy, dx), (0, 1))
+    assert not (taken & ~near).any() and (taken & ~met).sum() <= 0.1 * met.sum()
 
 
 def test_averages_survive_thousands_of_writes_in_any_order(voxels):
@@ -178,34 +224,32 @@ def test_averages_survive_thousands_of_writes_in_any_order(voxels):
     def run(order):
         parts = corners[order]
         scene = _scene((triangles(np.concatenate([parts[:2000], frame])), first), (triangles(parts[2000:]), second))
-        return voxels(scene, 16)[1]
+        return voxels(scene, 16)[:2]
 
-    out = run(np.arange(3000))
-    cell = np.unravel_index(np.argmax(out["area"].sum(axis=-1)), out["area"].shape[:3])
+    grid, out = run(np.arange(3000))
+    cell = tuple(int((0.03 - grid.low[k]) / grid.cell) for k in (2, 1, 0))
     share = area[:2000].sum() / area.sum()
     np.testing.assert_allclose(
         out["albedo"][cell][:3], share * np.array([0.9, 0.1, 0.3]) + (1 - share) * np.array([0.1, 0.5, 0.3]), atol=1 / 255
     )
     other = np.concatenate([rng.permutation(2000), 2000 + rng.permutation(1000)])
-    again = run(other)
+    _, again = run(other)
     for name in out:
         np.testing.assert_array_equal(out[name], again[name])
 
 
 def test_emission_and_opacity_are_those_of_the_material(voxels):
-    """Radiance far above 1 is kept to 1e-3; a surface of alpha ¼ counts for a quarter of its area."""
+    """Radiance far above 1 is kept to 1e-3; a surface of alpha ¼ blocks a quarter."""
     glow = scenes.emissive((1.0, 0.5, 0.0), 300.0)
     b = scenes.SceneBuilder()
     b.quads(np.array([[[-1, 0, -1], [0, 0, -1], [0, 0, 1], [-1, 0, 1]]]), glow)
     b.quads(np.array([[[0, 0, -1], [1, 0, -1], [1, 0, 1], [0, 0, 1]]]), scenes.principled(Alpha=0.25, Base_Color=(0.5,) * 3))
     grid, out, _ = voxels(b.build(scenes.perspective((0, -6, 0), (0, 0, 0), 0.8)), 16, emission=True)
-    taken = out["albedo"][..., 3] > 0
+    taken = out["opacity"] > 0
     left = np.broadcast_to(np.arange(grid.size[0]) < 7, taken.shape) & taken
     right = np.broadcast_to(np.arange(grid.size[0]) > 8, taken.shape) & taken
     np.testing.assert_allclose(out["emission"][left][:, :3], np.tile([300, 150, 0], (left.sum(), 1)), rtol=1e-3)
-    np.testing.assert_allclose(out["area"][right][:, 3], 0.25, atol=2e-3)
-    columns = out["area"][..., 1].sum(axis=1)
-    assert columns[4:12, 10:14] == pytest.approx(0.25, abs=2e-3)
+    np.testing.assert_allclose(out["opacity"][right], 0.25, atol=1 / 255)
 
 
 def test_only_a_change_of_the_scene_voxelises_again(voxels):
@@ -246,7 +290,7 @@ def test_layers_made_in_parts_are_the_same(voxels, monkeypatch):
     import gi_addon.passes.voxels as module
 
     _, whole, _ = voxels(scenes.cornell(), 24)
-    monkeypatch.setattr(module, "_SLAB_BYTES", 24 * 24 * 44 * 5)
+    monkeypatch.setattr(module, "_SLAB_BYTES", 24 * 24 * 128 * 5)
     _, parts, _ = voxels(scenes.cornell(), 24)
     for name in whole:
         np.testing.assert_array_equal(whole[name], parts[name])

@@ -30,7 +30,7 @@ from ..passes.screen import (
 from ..passes.smoothing import BlockSmoothing, raw_gather
 from ..passes.subsurface import Subsurface, SubsurfaceBack
 from ..passes.volumetric import MEDIUM_UNIFORMS, Volumetric, medium_defines, set_medium
-from ..passes.voxels import GRID_UNIFORMS, VoxelGrid, Voxelisation, voxel_grid
+from ..passes.voxels import GRID_UNIFORMS, VoxelGrid, Voxelisation, voxel_atlas, voxel_grid
 from ..passes.world_guide import WorldGuide
 from ..passes.world_rays import WorldRays
 from ..settings import Settings
@@ -46,7 +46,6 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         *([] if settings.vct.shadow_cones else [ShadowMaps()]),
         RSMGeneration(),
         Voxelisation(),
-        VoxelCoverage(),
         RadianceInjection(),
         GBuffer(),
         TranslucentLayer(),
@@ -82,85 +81,24 @@ def _one_bounce(facts: Facts) -> str | None:
     return None if facts.settings.bounces > 1 and facts.settings.use_indirect_diffuse else "one bounce needs no other"
 
 
-def _atlas(facts: Facts) -> tuple[int, int, int]:
-    """Six parts, two sides by three axes."""
-    x, y, z = voxel_grid(facts).size
-    return (2 * x, y, 3 * z)
-
-
-class VoxelCoverage(Pass):
-    """How much of a cell's faces its surfaces cover, and which way they face, at every mip."""
-
-    title = "Voxel Coverage"
-    reads = ("voxels.area", "voxels.normal")
-    writes = (
-        Texture("vct.coverage", "voxel_coverage", "share of a cell face that opaque surfaces cover, along x, y, z",
-                "rgba16f", lambda f: voxel_grid(f).size, mips=lambda f: voxel_grid(f).levels, scratch=True),
-        Texture("vct.facing", "voxel_facing", "which way fronts face, −1 … 1 along x, y, z: 0 where they face apart",
-                "rgba16f", lambda f: voxel_grid(f).size, mips=lambda f: voxel_grid(f).levels, scratch=True),
-        Texture("vct.opacity", "voxel_opacity", "optical depth of crossing the cell along x, y, z, over 5", "rgba16f",
-                lambda f: voxel_grid(f).size, mips=lambda f: voxel_grid(f).levels, filter="linear", scratch=True),
-    )  # fmt: skip
-    uniforms = (
-        Uniform("size", "ivec3", "cells of the level that is made"),
-        Uniform("level", "int", "which level that is"),
-    )
-    shaders = {
-        "main": {"compute": "engines/vct/coverage_comp.glsl"},
-        "mips": {"compute": "engines/vct/coverage_mips_comp.glsl"},
-        "opacity": {"compute": "engines/vct/opacity_comp.glsl"},
-    }
-    depends = Voxelisation.depends
-    settings = Voxelisation.settings
-
-    def rate(self, facts: Facts) -> str:
-        return Voxelisation().rate(facts)
-
-    def run(self, frame: Frame, planned: Planned) -> None:
-        grid = voxel_grid(planned.facts)
-        program = frame.program(planned)
-        frame.set(program, size=grid.size)
-        frame.compute(planned, program, grid.size, (4, 4, 4))
-        program = frame.program(planned, "mips")
-        coverage, facing, opacity = (frame.resources[f"vct.{name}"] for name in ("coverage", "facing", "opacity"))
-        size = grid.size
-        for level in range(grid.levels):
-            size = tuple(n // 2 for n in size)
-            for k, volume in enumerate((coverage, facing)):
-                volume.bind_to_image(3 + 2 * k, read=True, write=False, level=level)
-                volume.bind_to_image(4 + 2 * k, read=False, write=True, level=level + 1)
-            frame.set(program, size=size)
-            program.run(*(-(-n // 4) for n in size))
-            frame.gl.ctx.memory_barrier()
-        program = frame.program(planned, "opacity")
-        coverage.use(2)
-        size = grid.size
-        for level in range(grid.levels + 1):
-            opacity.bind_to_image(3, read=False, write=True, level=level)
-            frame.set(program, size=size, level=level)
-            program.run(*(-(-n // 4) for n in size))
-            size = tuple(n // 2 for n in size)
-        frame.gl.ctx.memory_barrier()
-
-
 class RadianceInjection(Pass):
     """Light that leaves the cells, and the directional mips of it."""
 
     title = "Voxel Radiance Injection"
     figure = "Voxel Radiance Injection, Voxel Anisotropic Mipmap Generation"
     reads = (
-        "vct.coverage", "vct.facing", "vct.opacity", "voxels.albedo", Optional("voxels.emission"),
+        "voxels.sheets", "voxels.kinds", "voxels.albedo", Optional("voxels.emission"), Optional("voxels.lamps"),
         Optional("rsm.depth"), Optional("rsm.albedo"), Optional("rsm.normal"), Optional("rsm.lights"), Optional("rsm.views"),
     )  # fmt: skip
     writes = (
-        Texture("vct.radiance", "voxel_radiance", "by side and axis: radiance × alpha, W/(m²·sr), of surfaces whose fronts "
-                "face that way; alpha, their share of vct.opacity", "rgba16f", _atlas, mips=lambda f: voxel_grid(f).levels,
-                filter="linear", scratch=True),
-        Texture("vct.back", "voxel_back", "radiance × alpha, W/(m²·sr), that leaves surfaces by their backs; alpha, the sum of "
-                "vct.opacity", "rgba16f", lambda f: voxel_grid(f).size, mips=lambda f: voxel_grid(f).levels,
+        Texture("vct.radiance", "voxel_radiance", "by side and axis: radiance × alpha, W/(m²·sr), that leaves the front of the "
+                "sheet; alpha, the share of the cell's face that it covers", "rgba16f", voxel_atlas,
+                mips=lambda f: voxel_grid(f).levels, filter="linear", scratch=True),
+        Texture("vct.back", "voxel_back", "radiance × alpha, W/(m²·sr), that leaves sheets by their backs; alpha, the sum of "
+                "what they cover", "rgba16f", lambda f: voxel_grid(f).size, mips=lambda f: voxel_grid(f).levels,
                 filter="linear", scratch=True),
         Texture("vct.bounce", "voxel_bounce", "by side and axis: radiance of the later bounces, W/(m²·sr)", "rgba16f",
-                _atlas, when=_one_bounce, scratch=True),
+                voxel_atlas, when=_one_bounce, scratch=True),
         Texture("vct.bounce_back", "voxel_bounce_back", "the same by the surfaces' backs", "rgba16f",
                 lambda f: voxel_grid(f).size, when=_one_bounce, scratch=True),
     )  # fmt: skip
@@ -230,7 +168,7 @@ def build_mips(frame: Frame, planned: Planned, grid: VoxelGrid) -> None:
 
 
 # What cones read.
-_VOLUMES = ("vct.radiance", "vct.back", "vct.opacity", "vct.facing")
+_VOLUMES = ("vct.radiance", "vct.back", "voxels.sheets", "voxels.kinds")
 _CONE_UNIFORMS = (
     *GRID_UNIFORMS,
     Uniform("grid_levels", "float", "mips above the cells"),
@@ -316,7 +254,7 @@ class GlossyCones(ScreenPass):
 
     title = "Voxel Glossy Reflections"
     figure = "Voxel Lighting Computation"
-    reads = (*_VOLUMES, "gbuffer.depth", "gbuffer.normal", *LOBE)
+    reads = (*_VOLUMES, "voxels.albedo", "gbuffer.depth", "gbuffer.normal", *LOBE)
     writes = (INDIRECT_GLOSSY,)
     uniforms = _CONE_UNIFORMS
     fragment = "engines/vct/glossy_frag.glsl"
@@ -358,7 +296,7 @@ class RefractionCones(ScreenPass):
 
     title = "Voxel Translucency"
     figure = "Voxel Lighting Computation"
-    reads = (*_VOLUMES, *REFRACTING)
+    reads = (*_VOLUMES, "voxels.albedo", *REFRACTING)
     writes = (TRANSMISSION_INDIRECT,)
     uniforms = _CONE_UNIFORMS
     fragment = "engines/vct/refraction_frag.glsl"

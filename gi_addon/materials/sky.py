@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from .hosek import HOSEK_SLANT, hosek_neighbours
+from .hosek import HOSEK_SLANT, horizon_basis, hosek_neighbours
 from .spectrum import OBSERVER, REC709_FROM_XYZ
 
 SIZE = (256, 128)  # of the image; half of the azimuths are computed, the sky is symmetric about its sun
@@ -317,12 +317,12 @@ def hosek(elevation: float, turbidity: float, albedo: float) -> Sky:
     horizon it goes on as at it."""
     rows, azimuths = _rays()
     mu = np.clip(_directions(rows, azimuths) @ _directions(np.array([elevation]), np.array([np.pi]))[0, 0], -1.0, 1.0)
-    slant = 1.0 / (np.maximum(np.sin(rows), 1e-3) + HOSEK_SLANT)[:, None]
+    gamma, slant = np.arccos(mu), 1.0 / (np.maximum(np.sin(rows), 1e-3) + HOSEK_SLANT)[:, None]
     rgb = np.zeros((*mu.shape, 3))
     for weight, numbers in hosek_neighbours(turbidity, elevation, albedo):
-        below = np.where(rows[:, None, None] < 0.0, numbers[:, 6], 1.0)
-        rgb += weight * below * np.stack([perez(n[:6], slant, np.arccos(mu)) for n in numbers], -1)
-    return Sky(_mirrored(rgb), np.zeros(3), np.zeros(3))
+        above = np.stack([perez(n[:6], slant, gamma) for n in numbers], -1)
+        rgb += weight * np.where(rows[:, None, None] < 0.0, horizon_basis(gamma) @ numbers[:, 6:].T, above)
+    return Sky(_mirrored(np.maximum(rgb, 0.0)), np.zeros(3), np.zeros(3))
 
 
 def preetham(elevation: float, turbidity: float) -> Sky:

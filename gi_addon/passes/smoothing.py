@@ -14,7 +14,8 @@ _DIRECTION = "Σ luminance × direction, and Σ luminance, of what arrives"
 def raw_gather(low: str) -> tuple[Texture, Texture]:
     """What a low-resolution gather writes for ``BlockSmoothing(low)``."""
     return (
-        Texture(f"{low}.raw", "raw_indirect", LIGHT, "rgba32f", gather_size, scratch=True),
+        Texture(f"{low}.raw", "raw_indirect", f"{LIGHT}; mean of 1/distance of what it comes from, 1/m (0: not known)",
+                "rgba32f", gather_size, scratch=True),
         Texture(f"{low}.raw_direction", "raw_direction", _DIRECTION, "rgba32f", gather_size, scratch=True),
     )
 

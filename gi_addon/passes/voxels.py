@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The scene in voxels: per cell its surface area as each axis sees it, albedo, normal and emission, averaged by area.
+"""The scene in voxels: per cell and side the sheet of surface that faces it most, and albedo and emission averaged by area.
+
+A triangle faces one of the six sides (±x, ±y, ±z) most. What faces the same side of a cell is one sheet: a plane, the mean of
+its triangles', and which of 4 × 4 squares of the cell's face it covers. So a flat surface is where it is, not where its cell
+is, a wall thinner than a cell has two sides, and an edge is known to a quarter of a cell.
 
 Every triangle is drawn along the axis that it faces most, grown by half a cell, and clipped exactly against each cell it
 meets: none is missed, and each adds the area that lies inside. Sums are integers, so that the order of drawing does not
@@ -21,10 +25,11 @@ from ..scene import DIFFUSE
 
 # Sums are fixed point: this many units are one cell face of area. 32 bits then hold 4096 layers of surface in one cell.
 UNITS = 1 << 20
-# Words per cell: weight, area × opacity, albedo, projected area, normal; emission.
-_WORDS, _EMISSION_WORDS = 11, 3
+# Words per cell: area, area × opacity, albedo; of each of six sheets its area, slopes and height; squares covered; how much of
+# what is reflected is diffuse; emission; area of lamps by side.
+_WORDS, _EMISSION_WORDS, _LAMP_WORDS = 33, 3, 6
 # For the sums of the layers that are made at once; OpenGL 4.3 promises storage blocks of no more than 128 MiB.
-_SLAB_BYTES = 64 * MIB
+_SLAB_BYTES = 128 * MIB
 
 GRID_UNIFORMS = (
     Uniform("grid_low", "vec3", "corner of the voxel grid, world space, m"),
@@ -74,7 +79,18 @@ def _size(facts: Facts) -> tuple[int, int, int]:
 
 
 def _words(facts: Facts) -> int:
-    return _WORDS + (_EMISSION_WORDS if facts.glowing_voxels else 0)
+    return _WORDS + (_EMISSION_WORDS if facts.glowing_voxels else _LAMP_WORDS if _lamps(facts) else 0)
+
+
+def _lamps(facts: Facts) -> bool:
+    """Whether lights are drawn from emissive surfaces."""
+    return len(facts.emitters) > 0 and facts.emissive_light and not facts.glowing_voxels
+
+
+def voxel_atlas(facts: Facts) -> tuple[int, int, int]:
+    """Six parts of the grid's size: two sides by three axes."""
+    x, y, z = voxel_grid(facts).size
+    return (2 * x, y, 3 * z)
 
 
 def _slab(facts: Facts) -> int:
@@ -90,14 +106,17 @@ class Voxelisation(Pass):
     figure = "Voxelization"
     reads = (Optional("brdf.albedo"), Optional("brdf.average"), Optional("brdf.energy"))
     writes = (
-        Texture("voxels.area", "voxel_area", "area of opaque surface in the cell as seen along x, y, z, in cell faces; "
-                "mean opacity of the surfaces, 0 in empty cells", "rgba16f", _size),
-        Texture("voxels.albedo", "voxel_albedo", "mean share of light that the surfaces reflect; 1 where there are any",
+        Texture("voxels.sheets", "voxel_sheets", "by side and axis: ½ + ½ slopes and ½ + ⅓ height of the sheet over the cell's "
+                "middle, in cells; a bit for each square that it covers, over 65535", "rgba16", voxel_atlas),
+        Texture("voxels.kinds", "voxel_kinds", "a bit for each kind of sheet in the cell or, in an empty one, 64 + level of the "
+                "largest empty block around it, over 255; mean opacity", "rg8", _size,
+                mips=lambda f: voxel_grid(f).levels, scratch=True),
+        Texture("voxels.albedo", "voxel_albedo", "mean share of light that the surfaces reflect; how much of it is diffuse",
                 "rgba8", _size),
-        Texture("voxels.normal", "voxel_normal", "Σ area × opacity × normal of their fronts, world space, in cell faces: "
-                "shorter than the area where they face apart", "rgba16f", _size),
         Texture("voxels.emission", "voxel_emission", "mean emitted radiance, W/(m²·sr)", "rgba16f", _size,
                 when=lambda f: None if f.glowing_voxels else "no voxel shines: nothing emits, or lights sampled on it do"),
+        Texture("voxels.lamps", "voxel_lamps", "share of the cell's face along x, y, z that lamps cover", "rgba8", _size,
+                when=lambda f: None if _lamps(f) else "no light is drawn from emissive surfaces"),
         Buffer("voxels.sums", "voxel_sums", "fixed-point sums of the layers in the making", "uint", np.dtype("u4"),
                lambda f: _slab(f) * _size(f)[0] * _size(f)[1] * _words(f), scratch=True),
         Texture("voxels.raster", "voxel_raster", "stands for the grid's layers while triangles are drawn; holds nothing",
@@ -107,8 +126,13 @@ class Voxelisation(Pass):
         *GRID_UNIFORMS,
         Uniform("slab", "ivec2", "first layer in the making, and how many"),
         Uniform("emission_unit", "float", "radiance of one unit of the emission's sums per unit of weight, W/(m²·sr)"),
+        Uniform("size", "ivec3", "cells of the level that is made"),
+        Uniform("upwards", "int", "1 when a level is made of the finer one"),
+        Uniform("topmost", "int", "1 when no level is above"),
     )
-    shaders = {"resolve": {"compute": "passes/voxels_comp.glsl"}}
+    shaders = {
+        "resolve": {"compute": "passes/voxels_comp.glsl"}, "empty": {"compute": "passes/voxels_empty_comp.glsl"},
+    }  # fmt: skip
     depends = ("transforms", "meshes", "materials")
     settings = ("vct.resolution", "vct.emissive_voxels", "use_area_lights")
 
@@ -119,7 +143,8 @@ class Voxelisation(Pass):
         return None if facts.triangles else "the scene has no surfaces"
 
     def defines(self, facts: Facts) -> dict[str, int]:
-        return {"VOXEL_UNITS": UNITS, "VOXEL_WORDS": _words(facts), "VOXEL_EMISSION": int(facts.glowing_voxels)}
+        return {"VOXEL_UNITS": UNITS, "VOXEL_WORDS": _words(facts), "VOXEL_EMISSION": int(facts.glowing_voxels),
+                "VOXEL_LAMPS": int(_lamps(facts))}
 
     def run(self, frame: Frame, planned: Planned) -> None:
         facts = planned.facts
@@ -156,6 +181,20 @@ class Voxelisation(Pass):
             frame.gl.ctx.memory_barrier()
             frame.set(resolve, slab=(first, count), **values)
             self._resolve(frame, planned, resolve, (*grid.size[:2], count))
+        self._find_empty(frame, planned, grid)
+
+    @staticmethod
+    def _find_empty(frame: Frame, planned: Planned, grid: VoxelGrid) -> None:
+        """The levels of voxels.kinds, up and down again."""
+        program, kinds = frame.program(planned, "empty"), frame.resources["voxels.kinds"]
+        steps = [(level, True) for level in range(grid.levels)] + [(level, False) for level in range(grid.levels, -1, -1)]
+        for level, upwards in steps:
+            kinds.bind_to_image(4, read=True, write=True, level=level)
+            kinds.bind_to_image(5, read=True, write=True, level=min(level + 1, grid.levels))
+            size = tuple(n >> (level + upwards) for n in grid.size)
+            frame.set(program, size=size, upwards=int(upwards), topmost=int(level == grid.levels))
+            program.run(*(-(-n // 4) for n in size))
+            frame.gl.ctx.memory_barrier()
 
     @staticmethod
     def _resolve(frame: Frame, planned: Planned, program, size: tuple[int, int, int]) -> None:

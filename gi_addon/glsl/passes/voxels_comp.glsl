@@ -2,6 +2,8 @@
 
 layout(local_size_x = 4, local_size_y = 4, local_size_z = 4) in;
 
+float sum_at(uint at) { return float(int(voxel_sums[at])); }
+
 void main()
 {
     ivec3 at = ivec3(gl_GlobalInvocationID);
@@ -12,23 +14,33 @@ void main()
     ivec3 cell = at + ivec3(0, 0, slab.x);
     float weight = float(voxel_sums[first]);
     float opaque = float(voxel_sums[first + 1u]);
-    float inverse = weight > 0.0 ? 1.0 / weight : 0.0;
     // Colours are those of the opaque share: what is seen where a ray is stopped.
     float color = opaque > 0.0 ? 1.0 / opaque : 0.0;
-#if HAS_VOXEL_AREA
-    vec3 area = vec3(voxel_sums[first + 5u], voxel_sums[first + 6u], voxel_sums[first + 7u]) / float(VOXEL_UNITS);
-    imageStore(voxel_area, cell, vec4(area, opaque * inverse));
-#endif
+    uint kinds = 0u;
+    for (int part = 0; part < 6; ++part) {
+        uint sheet = first + 5u + 4u * uint(part);
+        float share = sum_at(sheet);
+        uint bits = voxel_sums[first + 29u + uint(part >> 1)] >> (16 * (part & 1)) & 0xFFFFu;
+        vec3 plane = share > 0.0 ? vec3(sum_at(sheet + 1u), sum_at(sheet + 2u), sum_at(sheet + 3u)) / share : vec3(0.0);
+        kinds |= bits != 0u && opaque > 0.0 ? 1u << part : 0u;
+        imageStore(voxel_sheets, ivec3(cell.x + (part & 1) * grid_size.x, cell.y, cell.z + (part >> 1) * grid_size.z),
+                   vec4(0.5 + 0.5 * plane.xy, 0.5 + plane.z / 3.0, float(bits) / 65535.0));
+    }
+    imageStore(voxel_kinds, cell, vec4(float(kinds) / 255.0, opaque / max(weight, 1.0), 0.0, 0.0));
 #if HAS_VOXEL_ALBEDO
     vec3 albedo = vec3(voxel_sums[first + 2u], voxel_sums[first + 3u], voxel_sums[first + 4u]) * color;
-    imageStore(voxel_albedo, cell, vec4(min(albedo, vec3(1.0)), weight > 0.0 ? 1.0 : 0.0));
-#endif
-#if HAS_VOXEL_NORMAL
-    vec3 normal = vec3(ivec3(uvec3(voxel_sums[first + 8u], voxel_sums[first + 9u], voxel_sums[first + 10u])));
-    imageStore(voxel_normal, cell, vec4(normal / float(VOXEL_UNITS), 0.0));
+    imageStore(voxel_albedo, cell, vec4(min(albedo, vec3(1.0)), float(voxel_sums[first + 32u]) / max(weight, 1.0)));
 #endif
 #if HAS_VOXEL_EMISSION
-    vec3 emission = vec3(voxel_sums[first + 11u], voxel_sums[first + 12u], voxel_sums[first + 13u]);
+    vec3 emission = vec3(voxel_sums[first + 33u], voxel_sums[first + 34u], voxel_sums[first + 35u]);
     imageStore(voxel_emission, cell, vec4(emission * (emission_unit * float(VOXEL_UNITS) * color), 0.0));
+#endif
+#if HAS_VOXEL_LAMPS
+    vec3 lamps = vec3(0.0);
+    for (int axis = 0; axis < 3; ++axis) {
+        // A lamp with two sides covers what one of them does.
+        lamps[axis] = float(max(voxel_sums[first + 33u + 2u * uint(axis)], voxel_sums[first + 34u + 2u * uint(axis)]));
+    }
+    imageStore(voxel_lamps, cell, vec4(min(lamps / float(VOXEL_UNITS), vec3(1.0)), 0.0));
 #endif
 }

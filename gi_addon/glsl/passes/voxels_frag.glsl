@@ -50,6 +50,43 @@ float seen_area(vec3 polygon[MOST], int count)
 
 void add(uint at, float value) { atomicAdd(voxel_sums[at], uint(int(round(value)))); }
 
+// Which of the 4 × 4 squares of the cell's face the polygon covers any of: a bit each, u fastest. Two convex shapes are apart
+// if a side of either parts them. Rounding alone, TOUCH, covers nothing.
+const float TOUCH = 1e-3;
+
+uint squares_covered(vec3 polygon[MOST], int count, vec2 corner)
+{
+    vec2 low = vec2(1e30);
+    vec2 high = vec2(-1e30);
+    vec3 sum = vec3(0.0);
+    for (int i = 0; i < MOST; ++i) {
+        if (i < count) {
+            low = min(low, polygon[i].xy);
+            high = max(high, polygon[i].xy);
+            sum += cross(polygon[i] - polygon[0], polygon[i + 1 < count ? i + 1 : 0] - polygon[0]);
+        }
+    }
+    uint bits = 0u;
+    for (int square = 0; square < 16; ++square) {
+        vec2 middle = corner + (vec2(square & 3, square >> 2) + 0.5) * 0.25;
+        bool apart = any(greaterThan(low, middle + 0.125 - TOUCH)) || any(lessThan(high, middle - 0.125 + TOUCH));
+        for (int i = 0; i < MOST; ++i) {
+            if (i < count) {
+                vec2 from = polygon[i].xy;
+                vec2 edge = polygon[i + 1 < count ? i + 1 : 0].xy - from;
+                // Inwards, whichever way the corners go round.
+                vec2 inner = sum.z < 0.0 ? vec2(edge.y, -edge.x) : vec2(-edge.y, edge.x);
+                float reach = (0.125 - TOUCH) * (abs(inner.x) + abs(inner.y));
+                apart = apart || dot(inner, middle - from) < -reach;
+            }
+        }
+        bits |= apart ? 0u : 1u << square;
+    }
+    // Less than rounding: where it is.
+    ivec2 at = clamp(ivec2((0.5 * (low + high) - corner) * 4.0), ivec2(0), ivec2(3));
+    return bits != 0u ? bits : 1u << (at.x + 4 * at.y);
+}
+
 void main()
 {
     vec3 front = dot(vary_normal_ws, triangle_normal_ws) < 0.0 ? -triangle_normal_ws : triangle_normal_ws;
@@ -57,9 +94,11 @@ void main()
     Closure c = surface_closure(point);
     float opacity = surface_opacity(c);
     vec3 albedo = c.diffuse;
+    float diffuse = luminance(c.diffuse);
 #if SURFACE_TABLES > 0
     albedo += lobe_albedo_average(brdf_average, brdf_energy, closure_lobe(c));
 #endif
+    diffuse /= max(luminance(albedo), 1e-6);
     albedo = saturate(albedo); // more than all light reflected would not settle
 
     // The triangle inside this column.
@@ -112,18 +151,29 @@ void main()
         add(at + 2u, weight * albedo.r);
         add(at + 3u, weight * albedo.g);
         add(at + 4u, weight * albedo.b);
-        vec3 vector = front * (seen / along * float(VOXEL_UNITS) * opacity);
-        add(at + 5u, abs(vector.x));
-        add(at + 6u, abs(vector.y));
-        add(at + 7u, abs(vector.z));
-        add(at + 8u, vector.x);
-        add(at + 9u, vector.y);
-        add(at + 10u, vector.z);
+        add(at + 32u, weight * diffuse);
+        // The plane as a height over the cell's middle: along the axis, x + slope · (u, v) = height.
+        vec3 across = triangle_axis == 0 ? front.yzx : triangle_axis == 1 ? front.zxy : front;
+        vec2 slope = across.xy / across.z;
+        float height = triangle_a.z - layer - 0.5 + dot(slope, triangle_a.xy - column - 0.5);
+        // A part so small that sums round is still a plane: to a thousandth.
+        float share = max(round(seen * float(VOXEL_UNITS) * opacity), 1024.0);
+        int side = across.z < 0.0 ? 1 : 0;
+        uint sheet = at + 5u + 4u * uint(2 * triangle_axis + side);
+        add(sheet, share);
+        add(sheet + 1u, share * slope.x);
+        add(sheet + 2u, share * slope.y);
+        add(sheet + 3u, share * clamp(height, -1.5, 1.5));
+        atomicOr(voxel_sums[at + 29u + uint(triangle_axis)], squares_covered(part, corners, column) << (16 * side));
 #if VOXEL_EMISSION
         float scale = weight / (float(VOXEL_UNITS) * emission_unit);
-        add(at + 11u, c.emission.r * scale);
-        add(at + 12u, c.emission.g * scale);
-        add(at + 13u, c.emission.b * scale);
+        add(at + 33u, c.emission.r * scale);
+        add(at + 34u, c.emission.g * scale);
+        add(at + 35u, c.emission.b * scale);
+#elif VOXEL_LAMPS
+        if (max3(c.emission) > 0.0) {
+            add(at + 33u + uint(2 * triangle_axis + side), seen * float(VOXEL_UNITS));
+        }
 #endif
     }
 }

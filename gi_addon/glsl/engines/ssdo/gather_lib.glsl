@@ -63,10 +63,11 @@ Gathered gather_screen(vec3 position_ws, vec3 n, vec3 ng, vec3 v, ivec2 place)
                 Covered r = scan_next(scan, slice, k);
                 uint seen = r.sectors & ~mask;
                 if (seen != 0u && r.distance <= reach) {
+                    uint lit = r.lit & ~mask;
                     mask |= seen;
-                    if (faces(r.at.plane, r.at.pixel, origin)) {
+                    if (lit != 0u && faces(r.at.plane, r.at.pixel, origin)) {
                         vec3 direction = v * r.direction.x + t * r.direction.y;
-                        float share = float(bitCount(seen)) / SECTORS * slice.weight;
+                        float share = float(bitCount(lit)) / SECTORS * slice.weight;
                         add_light(g, sent_from(r.at.pixel) * share, direction, dot(direction, n));
                     }
                 }

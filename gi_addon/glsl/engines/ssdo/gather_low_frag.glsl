@@ -12,7 +12,7 @@ void main()
     if (r.exists) {
         vec2 uv = (vec2(r.pixel) + 0.5) * view.inverse_resolution;
         Gathered g = gather_screen(r.position_ws, r.n, r.ng, view_direction_ws(uv), block);
-        raw_indirect = vec4(g.radiance, 1.0);
+        raw_indirect = vec4(g.radiance, 0.0);
         raw_direction = g.direction;
     }
 }

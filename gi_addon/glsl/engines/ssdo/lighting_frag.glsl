@@ -36,7 +36,9 @@ void main()
     found = interpolated_indirect(position_ws, n, ng, depth, radiance);
 #endif
     if (!found) {
-        radiance = gather_screen(position_ws, n, ng, view_direction_ws(uv), pixel + view.pixel_offset).radiance;
+        // No neighbour adds its slices here: each sub-frame takes those of the next.
+        ivec2 place = pixel + view.pixel_offset + (ivec2(view.subframe) >> ivec2(0, 1));
+        radiance = gather_screen(position_ws, n, ng, view_direction_ws(uv), place).radiance;
     }
     set_light(radiance);
 }

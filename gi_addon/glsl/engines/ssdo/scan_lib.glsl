@@ -84,7 +84,8 @@ struct Covered {
     ScreenSample at;
     vec2 direction;   // unit, in the slice
     float distance;   // world units; 0 where nothing is
-    uint sectors;
+    uint lit;         // sectors in which it is seen
+    uint sectors;     // and those behind it that it fills
 };
 
 // What the pixel before the k-th sample's covers, which is known when that is another: k from 0 to `steps`, where the way ends.
@@ -93,7 +94,7 @@ Covered scan_next(inout Scan scan, Slice slice, int k)
 {
     ScreenSample a = scan.last;
     ScreenSample b = a;
-    Covered r = Covered(a, vec2(1.0, 0.0), 0.0, 0u);
+    Covered r = Covered(a, vec2(1.0, 0.0), 0.0, 0u, 0u);
     float until = 1.0;
     if (k < scan.steps) {
         b.s = mix(scan.pixel, 1.0, spacing(float(k), scan.steps, scan.jitter));
@@ -126,7 +127,8 @@ Covered scan_next(inout Scan scan, Slice slice, int k)
                                       : scan.across.y > 0.0 ? int(SECTORS) : 0;
         int after = sectors_below(slice, unit(slice_toward(scan, a, until)));
         int behind = sectors_below(slice, unit(d - vec2(scan.thickness * far, 0.0)));
-        r.sectors = bits_below(max(max(before, after), behind)) & ~bits_below(min(min(before, after), behind));
+        r.lit = bits_below(max(before, after)) & ~bits_below(min(before, after));
+        r.sectors = r.lit | bits_below(max(after, behind)) & ~bits_below(min(after, behind));
     }
     scan.last = b;
     scan.since = until;

@@ -13,16 +13,6 @@ float voxel_visibility(Light light, vec3 position_ws)
     vec3 l;
     float angle;
     light_arriving(light, position_ws, l, angle);
-    // Not into the blur of what the light hangs from.
-    float reach = light_is_directional(light) ? 1e30
-                                              : distance(light.position_ws, position_ws) / grid.cell - surface_reach(l);
-    // Enters the grid here.
-    vec3 d = mix(l, vec3(1e-9), lessThan(abs(l), vec3(1e-9)));
-    vec3 enter = min(-start / d, (grid.size - start) / d);
-    float near = max(max(enter.x, max(enter.y, enter.z)), 0.0);
-    if (near >= reach) {
-        return 1.0;
-    }
-    Cone cone = Cone(start + l * near, l, tan(min(angle, 0.785)), near, reach - near, vec3(0.0), Departure(0.0, 0.0)); // 45°
-    return trace_open(voxel_radiance, voxel_opacity, grid, cone, 0.0);
+    float reach = light_is_directional(light) ? 1e30 : distance(light.position_ws, position_ws) / grid.cell - LIFT;
+    return trace_open(voxel_sheets, voxel_kinds, grid, Cone(start, l, 0.0, reach, 0.0));
 }

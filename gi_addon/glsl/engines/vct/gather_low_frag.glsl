@@ -13,7 +13,7 @@ void main()
     raw_direction = vec4(0.0);
     if (r.exists) {
         Gathered g = gather_cones(r.position_ws, r.n, r.ng);
-        raw_indirect = vec4(g.radiance, 1.0);
+        raw_indirect = vec4(g.radiance, g.nearness);
         raw_direction = g.direction;
     }
 }

@@ -8,7 +8,7 @@
 #include "lib/view_lib.glsl"
 #include "lib/sequence_lib.glsl"
 #include "lib/bsdf_lib.glsl"
-#include "engines/vct/diffuse_lib.glsl"
+#include "engines/vct/seen_lib.glsl"
 
 void main()
 {
@@ -38,7 +38,7 @@ void main()
     }
     float spread = min(2.0 * sqrt(2.0 / cone_sets) * alpha, 1.0);
     Cone cone = surface_cone(voxel_grid(), position_ws, ng, l, spread, 1e30);
-    ConeResult result = trace_cone(voxel_radiance, voxel_back, voxel_opacity, voxel_grid(), cone, cone_phase());
+    ConeResult result = trace_seen(voxel_grid(), cone);
     float shadowing = ggx_visible_weight(v_local.z, l_local.z, alpha);
     vec3 gain = multiscatter_gain(brdf_energy, brdf_average, lobe, v_local.z);
     indirect_glossy = vec4(result.radiance * fresnel(lobe, saturate(dot(v_local, h))) * gain * shadowing, 1.0);

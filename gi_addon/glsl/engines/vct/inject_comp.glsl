@@ -1,12 +1,12 @@
-// Radiance that leaves each cell's surfaces, by direction: what the lights' reflective shadow maps show of them, and what
-// they emit (paper Figure 4c, Voxel Radiance Injection).
+// Radiance that leaves each cell's sheets: what the lights' reflective shadow maps show of them, and what they emit (paper
+// Figure 4c, Voxel Radiance Injection).
 //
-// The paper scatters RSM texels into cells: their number per cell depends on both resolutions. Here each cell asks. Rays
-// from the light through points of the cell end where the map says: inside the cell (lit, and this is what it
-// reflects), before it (blocked), or behind it (no surface on this ray). So
-//     L = Σ_lit B/π · w(n) / Σ_lit w(n)  ×  lit / (lit + blocked),      w(n) = max(n·side, 0),
-// with B the radiosity of the texel, albedo × irradiance × N·L: no resolution is in it, and a cell half in shadow gives
-// half of its light.
+// The paper scatters RSM texels into cells: their number per cell depends on both resolutions. Here each sheet asks, at the middle
+// of each square that it covers. The ray from the light to that point ends on the sheet (lit, and this is what it reflects),
+// before it (blocked), or behind it (no surface there). So
+//     L = Σ_lit B/π / (lit + blocked)
+// with B the radiosity of the texel, albedo × irradiance × N·L: no resolution is in it, and a sheet half in shadow gives half
+// of its light.
 
 #include "engines/vct/volume_lib.glsl"
 #if HAS_RSM_DEPTH
@@ -20,14 +20,82 @@ layout(binding = 12) uniform sampler3D bounce_now;
 layout(binding = 13) uniform sampler3D bounce_back_now;
 #endif
 
-// Points of a cell: M. Roberts' R3 sequence, multiples of the powers of 1/1.2207… (root of x⁴ = x + 1).
-const int POINTS = 16;
-const vec3 R3 = vec3(0.8191725134, 0.6710436067, 0.5497004779);
-// A surface this far outside, in cells, is rounding; one up to a whole cell outside speaks for the cell if none is inside
-// (cells that a surface only grazes are missed by all rays), by a weight that any inside overrules.
-const float ROUNDING = 0.51;
-const float NEAR_BY = 1.0;
-const float NEAR_BY_WEIGHT = 1e-3;
+#if HAS_RSM_DEPTH
+// The light is on the sheet where it ends within what a bent surface leaves its mean plane by (R = 2 cells, cone_lib.glsl: at
+// most (√2)²/2R = ½) and faces as the sheet does, within 60°.
+const float ON_SHEET = 0.5;
+const float FACING = 0.5;
+// A texel that is so near that it may show another surface beside the point speaks for it if nothing else does.
+const float BESIDE_WEIGHT = 1e-3;
+
+struct Lit {
+    vec4 sum;      // radiance, number
+    float blocked;
+};
+
+// What light of view `v` at point `p` of a sheet of normal `n` shows, added to the side that it shines on.
+void ask_view(int index, vec3 p, vec3 n, float covered, inout Lit front, inout Lit back)
+{
+    LightView v = rsm_views[index];
+    vec3 at = light_view_project(v, p);
+    if (any(greaterThan(abs(at.xy), vec2(1.0))) || (v.perspective > 0.5 && at.z <= 0.0)) {
+        return; // another view of the light has this point, or none: then it is dark
+    }
+    RsmTexel t = rsm_texel(index, ivec2(v.rect.xy + (at.xy / v.guard * 0.5 + 0.5) * v.rect.zw));
+    if (t.area <= 0.0) {
+        return;
+    }
+    // Where this very ray meets the texel's plane.
+    vec3 from = v.perspective > 0.5 ? v.origin_ws : p - v.axis_z * at.z;
+    vec3 ray = p - from;
+    float facing = dot(ray, t.normal_ws);
+    vec3 hit = t.position_ws;
+    if (abs(facing) > GRAZING_COS * length(ray)) {
+        hit = from + ray * (dot(t.position_ws - from, t.normal_ws) / facing);
+    }
+    bool on_front = dot(ray, n) < 0.0;
+    vec3 out_of = on_front ? n : -n;
+    bool on_sheet = abs(dot(hit - p, n)) <= ON_SHEET * grid_cell && dot(t.normal_ws, out_of) > FACING;
+    bool beside = !on_sheet && dot(hit - p, hit - p) <= t.area;
+    bool before = dot(hit - p, ray) < 0.0;
+    if (!on_sheet && !beside && !before) {
+        return;
+    }
+    vec4 light = vec4(0.0);
+    if (on_sheet || beside) {
+        light = vec4(t.flux / (t.area * PI), 1.0) * (on_sheet ? 1.0 : BESIDE_WEIGHT);
+        // What a lamp lights in its own cell's reach leaves past the lamp: the slit above a ceiling lamp shares its cell
+        // with the room, which sees the lamp.
+        if (rsm_lights[v.light].kind == LIGHT_MESH && distance(p, from) < 1.733 * grid_cell) {
+            light.rgb *= 1.0 - covered;
+        }
+    }
+    float blocked = on_sheet || beside ? 0.0 : 1.0;
+    if (on_front) {
+        front.sum += light;
+        front.blocked += blocked;
+    } else {
+        back.sum += light;
+        back.blocked += blocked;
+    }
+}
+
+vec3 lit_mean(Lit lit)
+{
+    return lit.sum.a > 0.0 ? lit.sum.rgb / (lit.sum.a + lit.blocked) : vec3(0.0);
+}
+
+// No point of a cell, a ball of radius √3/2 cells, is in a view whose span its middle lies farther outside of.
+bool outside_view(LightView v, vec3 center)
+{
+    vec3 middle = light_view_project(v, center);
+    float radius = 0.867 * grid_cell;
+    float away = v.perspective > 0.5 ? middle.z - radius : 1.0;
+    float edge = max3(abs(vec3(middle.xy, 0.0)));
+    float margin = radius / (away * min(length(v.axis_x), length(v.axis_y))) * (1.0 + edge);
+    return (v.perspective > 0.5 && middle.z + radius <= 0.0) || (away > 0.0 && edge > 1.0 + margin);
+}
+#endif
 
 void main()
 {
@@ -35,135 +103,64 @@ void main()
     if (any(greaterThanEqual(cell, grid_size))) {
         return;
     }
-    bool empty = texelFetch(voxel_albedo, cell, 0).a == 0.0;
+    uint kinds = kinds_of(texelFetch(voxel_kinds, cell, 0));
+    bool empty = kinds >= 64u;
     if (empty && first_time == 0) {
         return; // as it was
     }
-    vec3 back = vec3(0.0);
-    vec3 leaving[6];
-    for (int f = 0; f < 6; ++f) {
-        leaving[f] = vec3(0.0);
-    }
+    vec3 emission = vec3(0.0);
+#if HAS_VOXEL_EMISSION
+    emission = texelFetch(voxel_emission, cell, 0).rgb; // by both sides of a surface
+#endif
+    vec3 center = grid_low + (vec3(cell) + 0.5) * grid_cell;
+    vec4 backs = vec4(0.0);
+    for (int part = 0; part < 6; ++part) {
+        vec4 fronts = vec4(0.0);
+        if (!empty && (kinds >> part & 1u) == 1u) {
+            Sheet sheet = sheet_at(voxel_sheets, cell, grid_size, part);
+            vec3 front = emission;
+            vec3 back = emission;
 #if HAS_RSM_DEPTH
-    if (!empty) {
-        vec3 low = grid_low + vec3(cell) * grid_cell;
-        vec3 center = low + 0.5 * grid_cell;
-        vec3 sum[6];
-        float weight[6];
-        for (int f = 0; f < 6; ++f) {
-            sum[f] = vec3(0.0);
-            weight[f] = 0.0;
-        }
-        vec4 back_sum = vec4(0.0);
-        // The cell's fronts as a vector over the area they could have at most; −1 … 1 against a normal.
-        vec3 coverage = texelFetch(voxel_coverage, cell, 0).rgb;
-        vec3 fronts = texelFetch(voxel_facing, cell, 0).rgb * coverage;
-        float inside = 0.0;  // rays that end here
-        float open_ = 0.0;   // rays that pass
-        float beside = 0.0;  // rays that end near by
-        for (int index = 0; index < view_count; ++index) {
-            LightView v = rsm_views[index];
-            // No point of the cell, a ball of radius √3/2 cells, is in a view whose span its middle lies farther outside of.
-            vec3 middle = light_view_project(v, center);
-            float radius = 0.867 * grid_cell;
-            float away = v.perspective > 0.5 ? middle.z - radius : 1.0;
-            float margin = radius / (away * min(length(v.axis_x), length(v.axis_y))) * (1.0 + max3(abs(vec3(middle.xy, 0.0))));
-            bool outside = v.perspective > 0.5 && middle.z + radius <= 0.0;
-            outside = outside || (away > 0.0 && max3(abs(vec3(middle.xy, 0.0))) > 1.0 + margin);
-            for (int i = 0; i < (outside ? 0 : POINTS); ++i) {
-                vec3 p = low + fract(0.5 + float(i) * R3) * grid_cell;
-                vec3 at = light_view_project(v, p);
-                if (any(greaterThan(abs(at.xy), vec2(1.0))) || (v.perspective > 0.5 && at.z <= 0.0)) {
-                    continue; // another view of the light has this point, or none: then it is dark
-                }
-                ivec2 texel = ivec2(v.rect.xy + (at.xy / v.guard * 0.5 + 0.5) * v.rect.zw);
-                RsmTexel t = rsm_texel(index, texel);
-                if (t.area <= 0.0) {
-                    open_ += 1.0;
-                    continue;
-                }
-                // Where this very ray meets the texel's plane.
-                vec3 from = v.perspective > 0.5 ? v.origin_ws : p - v.axis_z * at.z;
-                vec3 ray = p - from;
-                float facing = dot(ray, t.normal_ws);
-                vec3 hit = t.position_ws;
-                if (abs(facing) > GRAZING_COS * length(ray)) {
-                    hit = from + ray * (dot(t.position_ws - from, t.normal_ws) / facing);
-                }
-                vec3 offset = abs(hit - center) / grid_cell;
-                float out_by = max3(offset);
-                if (out_by > NEAR_BY) {
-                    open_ += dot(hit - center, ray) > 0.0 ? 1.0 : 0.0;
-                    continue;
-                }
-                // What an emissive surface lights within a cell's diagonal of itself is hidden by it: the slit above a ceiling
-                // lamp shares its cell with the room.
-                if (rsm_lights[v.light].kind == LIGHT_MESH && distance(hit, from) < 1.733 * grid_cell) {
-                    open_ += 1.0;
-                    continue;
-                }
-                bool here = out_by <= ROUNDING;
-                inside += here ? 1.0 : 0.0;
-                beside += here ? 0.0 : 1.0;
-                // The ray stands for a solid angle ∝ 1/|p|² (points fill the cell evenly), so for an area |hit|²/|p|² / cosθ:
-                // next to a lamp the mean over rays is not that over the surface.
-                float area = v.perspective > 0.5 ? dot(hit - from, hit - from) / max(dot(ray, ray), 1e-30) : 1.0;
-                float w = (here ? 1.0 : NEAR_BY_WEIGHT) * area / max(abs(facing) / length(ray), GRAZING_COS);
-                vec3 radiance = t.flux / (t.area * PI);
-                // A sheet's back is lit where all its fronts face away (−1); where surfaces face apart (0) it is some
-                // front that is lit.
-                float facing_light = dot(t.normal_ws, fronts) / max(dot(abs(t.normal_ws), coverage), 1e-6);
-                if (facing_light < -0.5) {
-                    back_sum += vec4(radiance, 1.0) * w;
-                } else {
-                    for (int f = 0; f < 6; ++f) {
-                        float side = (f & 1) == 0 ? t.normal_ws[f >> 1] : -t.normal_ws[f >> 1];
-                        sum[f] += w * max(side, 0.0) * radiance;
-                        weight[f] += w * max(side, 0.0);
+            float covered = 0.0;
+#if HAS_VOXEL_LAMPS
+            covered = texelFetch(voxel_lamps, cell, 0)[part >> 1];
+            ivec3 before = cell + ivec3(axis_vector(part >> 1)) * ((part & 1) == 0 ? 1 : -1);
+            if (all(greaterThanEqual(before, ivec3(0))) && all(lessThan(before, grid_size))) {
+                covered = max(covered, texelFetch(voxel_lamps, before, 0)[part >> 1]);
+            }
+#endif
+            vec3 n = sheet_normal(sheet, part);
+            Lit lit_front = Lit(vec4(0.0), 0.0);
+            Lit lit_back = Lit(vec4(0.0), 0.0);
+            for (int index = 0; index < view_count; ++index) {
+                bool outside = outside_view(rsm_views[index], center);
+                for (int square = 0; square < (outside ? 0 : 16); ++square) {
+                    if ((sheet.squares >> square & 1u) == 1u) {
+                        vec3 p = center + sheet_point(sheet, part, square_middle(square)) * grid_cell;
+                        ask_view(index, p, n, covered, lit_front, lit_back);
                     }
                 }
-            }
-            bool last = index + 1 == view_count || rsm_views[index + 1].light != v.light;
-            if (last) {
-                // Points on the border of two views are in both.
-                float blocked = max(float(POINTS) - inside - open_ - beside, 0.0);
-                float lit = inside > 0.0 ? inside : beside;
-                float share = lit > 0.0 ? lit / (lit + blocked) : 0.0;
-                for (int f = 0; f < 6; ++f) {
-                    leaving[f] += weight[f] > 0.0 ? sum[f] / weight[f] * share : vec3(0.0);
-                    sum[f] = vec3(0.0);
-                    weight[f] = 0.0;
+                bool last = index + 1 == view_count || rsm_views[index + 1].light != rsm_views[index].light;
+                if (last) {
+                    front += lit_mean(lit_front);
+                    back += lit_mean(lit_back);
+                    lit_front = lit_back = Lit(vec4(0.0), 0.0);
                 }
-                back += back_sum.a > 0.0 ? back_sum.rgb / back_sum.a * share : vec3(0.0);
-                back_sum = vec4(0.0);
-                inside = open_ = beside = 0.0;
             }
-        }
-    }
-#endif
-#if HAS_VOXEL_EMISSION
-    vec3 emission = texelFetch(voxel_emission, cell, 0).rgb; // by both sides of a surface
-    back += emission;
-    for (int f = 0; f < 6; ++f) {
-        leaving[f] += emission;
-    }
 #endif
 #if HAS_VOXEL_BOUNCE
-    if (add_bounce == 1 && !empty) {
-        back += texelFetch(bounce_back_now, cell, 0).rgb;
-        for (int f = 0; f < 6; ++f) {
-            leaving[f] += texelFetch(bounce_now, part_texel(cell, grid_size, f >> 1, f & 1), 0).rgb;
+            if (add_bounce == 1) {
+                front += texelFetch(bounce_now, part_texel(cell, grid_size, part >> 1, part & 1), 0).rgb;
+                back += texelFetch(bounce_back_now, cell, 0).rgb;
+            }
+#endif
+            float share = squares_share(sheet.squares);
+            fronts = vec4(front, 1.0) * share;
+            backs += vec4(back, 1.0) * share;
+        }
+        if (fronts.a > 0.0 || first_time == 1) {
+            imageStore(voxel_radiance, part_texel(cell, grid_size, part >> 1, part & 1), fronts);
         }
     }
-#endif
-    vec3 alpha = texelFetch(voxel_opacity, cell, 0).rgb;
-    vec3 facing = texelFetch(voxel_facing, cell, 0).rgb;
-    for (int f = 0; f < 6; ++f) {
-        int axis = f >> 1;
-        int side = f & 1;
-        float front = alpha[axis] * (0.5 + (side == 0 ? 0.5 : -0.5) * facing[axis]);
-        imageStore(voxel_radiance, part_texel(cell, grid_size, axis, side), vec4(leaving[f] * front, front));
-    }
-    float depth = alpha.x + alpha.y + alpha.z;
-    imageStore(voxel_back, cell, vec4(back * depth, depth));
+    imageStore(voxel_back, cell, backs);
 }

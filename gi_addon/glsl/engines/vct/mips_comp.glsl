@@ -17,49 +17,38 @@ void main()
     if (any(greaterThanEqual(cell, coarse_size))) {
         return;
     }
-    ivec3 fine_size = 2 * coarse_size;
-    int fine_level = coarse_level - 1;
-    vec3 alpha = texelFetch(voxel_opacity, cell, coarse_level).rgb;
-    if (max3(alpha) <= 0.0) {
-        if (first_time == 1) {
-            for (int part = 0; part < 6; ++part) {
-                imageStore(coarser, part_texel(cell, coarse_size, part >> 1, part & 1), vec4(0.0));
-            }
-            imageStore(coarser_back, cell, vec4(0.0));
-        }
-        return;
+    uint kinds = kinds_of(texelFetch(voxel_kinds, cell, coarse_level));
+    kinds = kinds >= 64u ? 0u : kinds;
+    if (kinds == 0u && first_time == 0) {
+        return; // as it was
     }
+    ivec3 fine_size = 2 * coarse_size;
     for (int part = 0; part < 6; ++part) {
         int axis = part >> 1;
         int side = part & 1;
-        ivec3 along = ivec3(equal(ivec3(0, 1, 2), ivec3(axis)));
-        ivec3 u = along.yzx;
-        ivec3 v = along.zxy;
+        ivec3 along = ivec3(axis_vector(axis));
+        ivec3 u = along.zxy;
+        ivec3 v = along.yzx;
         // The cell on the part's side is in front.
         ivec3 front = 2 * cell + along * (1 - side);
         ivec3 behind = 2 * cell + along * side;
         vec4 light = vec4(0.0);
-        float covered = 0.0;
-        for (int column = 0; column < 4; ++column) {
-            ivec3 across = u * (column & 1) + v * (column >> 1);
-            float left = 1.0;
-            for (int k = 0; k < 2; ++k) {
-                ivec3 at = (k == 0 ? front : behind) + across;
-                vec4 here = imageLoad(finer, part_texel(at, fine_size, axis, side));
-                float covers = min(texelFetch(voxel_coverage, at, fine_level)[axis], left);
-                float depth = texelFetch(voxel_opacity, at, fine_level)[axis];
-                light += depth > 0.0 ? here * (covers / depth) : vec4(0.0);
-                covered += covers;
-                left -= covers;
-            }
+        bool there = (kinds >> part & 1u) == 1u;
+        if (!there && first_time == 0) {
+            continue;
         }
-        imageStore(coarser, part_texel(cell, coarse_size, axis, side),
-                   covered > 0.0 ? light * (alpha[axis] / covered) : vec4(0.0));
+        for (int column = 0; column < (there ? 4 : 0); ++column) {
+            ivec3 across = u * (column & 1) + v * (column >> 1);
+            vec4 near = imageLoad(finer, part_texel(front + across, fine_size, axis, side));
+            vec4 far = imageLoad(finer, part_texel(behind + across, fine_size, axis, side));
+            float seen = min(far.a, 1.0 - min(near.a, 1.0));
+            light += 0.25 * (near + (far.a > 0.0 ? far * (seen / far.a) : vec4(0.0)));
+        }
+        imageStore(coarser, part_texel(cell, coarse_size, axis, side), light);
     }
     vec4 back = vec4(0.0);
-    for (int k = 0; k < 8; ++k) {
+    for (int k = 0; k < (kinds == 0u ? 0 : 8); ++k) {
         back += imageLoad(finer_back, 2 * cell + ivec3(k & 1, (k >> 1) & 1, k >> 2));
     }
-    float depth = alpha.x + alpha.y + alpha.z;
-    imageStore(coarser_back, cell, back.a > 0.0 ? back * (depth / back.a) : vec4(0.0));
+    imageStore(coarser_back, cell, 0.125 * back);
 }

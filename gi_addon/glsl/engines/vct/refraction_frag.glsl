@@ -8,7 +8,7 @@
 #include "lib/sequence_lib.glsl"
 #include "lib/bsdf_lib.glsl"
 #include "lib/refraction_lib.glsl"
-#include "engines/vct/diffuse_lib.glsl"
+#include "engines/vct/seen_lib.glsl"
 
 void main()
 {
@@ -36,14 +36,11 @@ void main()
     float alpha = max(sqr(texelFetch(translucent_color, pixel, 0).a), ALPHA_MIN);
     Grid grid = voxel_grid();
     float spread = min(sqrt(2.0 / cone_sets) * alpha * abs(1.0 - 1.0 / medium.x), 1.0);
-    // Clear glass is not in the voxels. Tinted glass is, by what it takes; that is in `tint` already, so the cone starts clear
-    // of what its cells are blurred to.
-    vec3 start = (ray.position_ws - grid.low) / grid.cell;
-    if (min(tint.r, min(tint.g, tint.b)) < 1.0) {
-        start += ray.direction * (surface_reach(ng) / max(abs(dot(ray.direction, ng)), 0.25));
-    }
-    Cone cone = Cone(start, ray.direction, spread, 0.0, 1e30, vec3(0.0), Departure(0.0, 0.0));
-    ConeResult result = trace_cone(voxel_radiance, voxel_back, voxel_opacity, grid, cone, cone_phase());
+    // Clear glass is not in the voxels. Tinted glass is, by what it takes; that is in `tint` already, so the cone leaves it: by
+    // its far side's front, or by a sheet's back.
+    vec3 start = (ray.position_ws - grid.low) / grid.cell + LIFT * ray.direction;
+    float side = surface_side(voxel_sheets, voxel_kinds, grid, start, ray.direction);
+    ConeResult result = trace_seen(grid, Cone(start, ray.direction, spread, 1e30, side));
     // A cone that leaves the scene knows nothing of what is there.
     if (result.transmittance < 0.5) {
         transmission_indirect = vec4(result.radiance / (1.0 - result.transmittance) * tint, 1.0);

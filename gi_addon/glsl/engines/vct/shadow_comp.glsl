@@ -1,5 +1,5 @@
 // Shadows by a cone to each light (paper §V-C): its angle is that of the patch that the light's point of this sub-frame
-// stands for, so that the penumbra is there at one sub-frame.
+// stands for: a set of axes over that patch, so that the penumbra is there at one sub-frame.
 
 #include "lib/view_lib.glsl"
 #include "lib/sequence_lib.glsl"
@@ -21,7 +21,8 @@ void main()
     vec3 ng = octahedral_decode(normals.zw);
     Grid grid = Grid(grid_low, grid_cell, vec3(grid_size), grid_levels);
     vec3 p = (position_ws - grid.low) / grid.cell;
-    Departure from = cone_departure(voxel_facing, p, ng);
+    float side = surface_side(voxel_sheets, voxel_kinds, grid, p, ng);
+    uint turn = hash_u32(uvec3(pixel, view.subframe));
     for (int i = 0; i < light_count; ++i) {
         Light light = lights[i];
         vec3 l;
@@ -30,11 +31,15 @@ void main()
         float visible = 1.0;
         if (depth > 0.0 && light.views > 0 && dot(n, l) > 0.0 && max3(arriving) > 0.0) {
             float reach = light_is_directional(light) ? 1e30 : distance(light.position_ws, position_ws) / grid.cell;
-            // Not into the blur of what the light hangs from.
-            reach = max(reach - from.above - surface_reach(l), 0.0);
-            float spread = tan(min(angle, 0.785)); // 45°
-            visible = trace_open(voxel_radiance, voxel_opacity, grid,
-                                 Cone(p + ng * from.above, l, spread, from.above, reach, ng, from), 0.0);
+            reach = max(reach - LIFT, 0.0); // not into what the light lies on
+            mat3 frame = frame_from_normal(l);
+            visible = 0.0;
+            for (int k = 0; k < cone_count; ++k) {
+                vec3 d = cone_direction(turn + uint(k));
+                Cone cone = Cone(p + LIFT * ng, normalize(l + frame * vec3(d.xy, 0.0) * tan(min(angle, 0.785))), // 45°
+                                 0.0, reach, side);
+                visible += trace_open(voxel_sheets, voxel_kinds, grid, cone) / float(cone_count);
+            }
         }
         imageStore(shadow_cones, ivec3(pixel, i), vec4(visible));
     }

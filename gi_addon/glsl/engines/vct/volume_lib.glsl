@@ -1,19 +1,14 @@
-// What the voxels block, and what light leaves them, by direction.
+// What the voxels hold, and what light leaves them, by side.
 //
-// Blocking is kept as an optical depth along each axis, τ/OPAQUE. Depths add up along a ray and interpolate without losing
-// any: ∫ τ over a linear blend of cells is their sum, however a ray is stepped through it. Opacities do not: half of two
-// half-opaque neighbours lets light through a wall that was whole (the usual 1 − (1 − α)^(step/voxel)).
+// A cell has a sheet of surface for each of the six sides that its surfaces face most (passes/voxels.py): a plane,
+// x_k + slope · (u, v) = height about the cell's middle, along axis k with u and v the next axes round, and which of 4 × 4
+// squares of the face it covers.
 //
-// Light is kept in an atlas of six parts, normals' directions +x … −z; part (side, axis) lies at (side, 0, axis) of
-// 2 × 1 × 3. A part holds the surfaces whose front faces that way: their share of the cell's depth along the axis in
-// alpha, and radiance × alpha. Light that leaves surfaces by their backs (a sheet without thickness, lit from behind) is in a
-// volume of its own. Fronts and backs apart, a slanted sheet is not half dark for one of the axes.
+// Light is kept in an atlas of six parts, sheets' sides +x … −z; part (side, axis) lies at (side, 0, axis) of 2 × 1 × 3.
+// Alpha is the share of the face that the sheet covers, rgb radiance × alpha. Light that leaves sheets by their backs (a sheet
+// without thickness, lit from behind) is in a volume of its own.
 
 #include "lib/math_lib.glsl"
-
-// Optical depth of a whole surface: it lets e^−5 = 0.7 % pass. A deeper one is met farther before its middle, as if all
-// were thicker: measured on an empty Cornell box, 8 gives relMSE .0109 and gain 1.054, 5 gives .0089 and 1.039.
-const float OPAQUE = 5.0;
 
 struct Grid {
     vec3 low;      // corner, m
@@ -22,84 +17,54 @@ struct Grid {
     float levels;  // mips above the cells
 };
 
+struct Sheet {
+    vec3 slant;     // 1 along the axis, the slopes along the others
+    float height;   // over the cell's middle, cells
+    uint squares;   // a bit for each that is covered
+};
+
 ivec3 part_texel(ivec3 cell, ivec3 size, int axis, int side)
 {
     return ivec3(cell.x + side * size.x, cell.y, cell.z + axis * size.z);
 }
 
-// One part at `uvw` in [0, 1]³ of the grid, filtered. Half a texel of the coarser level stays between neighbouring parts.
-vec4 part_at(sampler3D atlas, Grid grid, vec3 uvw, float lod, int axis, bool negative)
+vec3 axis_vector(int axis) { return vec3(equal(ivec3(axis), ivec3(0, 1, 2))); }
+
+// (u, v) of a vector.
+vec2 across_axis(vec3 v, int axis) { return axis == 0 ? v.yz : axis == 1 ? v.zx : v.xy; }
+
+// The vector whose part along the axis is x, and whose others are (u, v).
+vec3 along_axis(float x, vec2 uv, int axis)
 {
-    vec3 margin = 0.5 * exp2(ceil(lod)) / grid.size;
+    return axis == 0 ? vec3(x, uv) : axis == 1 ? vec3(uv.y, x, uv.x) : vec3(uv, x);
+}
+
+Sheet sheet_at(sampler3D sheets, ivec3 cell, ivec3 size, int part)
+{
+    vec4 texel = texelFetch(sheets, part_texel(cell, size, part >> 1, part & 1), 0);
+    return Sheet(along_axis(1.0, texel.xy * 2.0 - 1.0, part >> 1), texel.z * 3.0 - 1.5, uint(texel.w * 65535.0 + 0.5));
+}
+
+// A sheet's front normal.
+vec3 sheet_normal(Sheet sheet, int part) { return normalize(sheet.slant) * ((part & 1) == 0 ? 1.0 : -1.0); }
+
+// Middle of square `square` on the sheet, in cells from the cell's middle.
+vec3 sheet_point(Sheet sheet, int part, vec2 uv)
+{
+    return along_axis(sheet.height - dot(across_axis(sheet.slant, part >> 1), uv), uv, part >> 1);
+}
+
+vec2 square_middle(int square) { return (vec2(square & 3, square >> 2) + 0.5) * 0.25 - 0.5; }
+
+float squares_share(uint squares) { return float(bitCount(squares)) / 16.0; }
+
+// Kinds of sheets in a cell: 1 … 63 a bit each, or 64 + level of the largest empty block.
+uint kinds_of(vec4 texel) { return uint(texel.r * 255.0 + 0.5); }
+
+// One part at `uvw` in [0, 1]³ of the grid, filtered within level `lod`. Half a texel stays between neighbouring parts.
+vec4 part_at(sampler3D atlas, Grid grid, vec3 uvw, float lod, int part)
+{
+    vec3 margin = 0.5 * exp2(lod) / grid.size;
     uvw = clamp(uvw, margin, 1.0 - margin);
-    return textureLod(atlas, vec3((uvw.x + (negative ? 1.0 : 0.0)) / 2.0, uvw.y, (uvw.z + float(axis)) / 3.0), lod);
-}
-
-// Alpha of a cell of level `level` along each axis, from how much of its faces its surfaces cover. A plane cuts a column of
-// cells along the axis it faces most in three cells at most, and their coverages add up to 1: so the depth of a whole
-// surface is dealt out by share, along all axes by the same factor, and any ray through the plane meets OPAQUE in all
-// (∫ A_k |d_k| summed over the axes is Σ |n_k d_k| / |n·d| ≥ 1). Surfaces that fill less block what they cover:
-// Σ τ = −ln(1 − min(Σ A, 1)).
-vec3 cell_alpha(sampler3D coverage, ivec3 cell, int level)
-{
-    vec3 here = texelFetch(coverage, cell, level).rgb;
-    ivec3 size = textureSize(coverage, level);
-    int axis = here.x >= here.y && here.x >= here.z ? 0 : here.y >= here.z ? 1 : 2;
-    if (here[axis] <= 0.0) {
-        return vec3(0.0);
-    }
-    ivec3 along = ivec3(equal(ivec3(0, 1, 2), ivec3(axis)));
-    ivec3 before = cell - along;
-    ivec3 after = cell + along;
-    float sum = here[axis];
-    sum += before[axis] >= 0 ? texelFetch(coverage, before, level)[axis] : 0.0;
-    sum += after[axis] < size[axis] ? texelFetch(coverage, after, level)[axis] : 0.0;
-    return min(here * (-log(max(1.0 - sum, exp(-OPAQUE))) / (sum * OPAQUE)), vec3(1.0));
-}
-
-// Rays along +k see fronts that face −k.
-vec4 fronts_at(sampler3D atlas, Grid grid, vec3 uvw, vec3 direction, float lod)
-{
-    vec3 w = abs(direction);
-    return w.x * part_at(atlas, grid, uvw, lod, 0, direction.x > 0.0) +
-           w.y * part_at(atlas, grid, uvw, lod, 1, direction.y > 0.0) +
-           w.z * part_at(atlas, grid, uvw, lod, 2, direction.z > 0.0);
-}
-
-// Optical depth per length of one cell of the level, for a ray along `direction` at a point in cells. A sheet across axis
-// k has depth τ_k for a ray along k and τ_k |d_k| per unit length for any other, so that the whole of it is τ_k at every
-// angle. `leaving` 1 lets backs pass, −1 fronts, 0 nothing.
-float depth_at(sampler3D atlas, sampler3D opacity, Grid grid, vec3 p, vec3 direction, float lod, float leaving)
-{
-    vec3 uvw = p / grid.size;
-    float depth = dot(abs(direction), textureLod(opacity, uvw, lod).rgb);
-    if (leaving != 0.0 && depth > 0.0) {
-        float backs = max(depth - 2.0 * fronts_at(atlas, grid, uvw, direction, lod).a, 0.0) / depth;
-        depth *= leaving > 0.0 ? 1.0 - backs : backs;
-    }
-    return depth * OPAQUE;
-}
-
-// What a ray meets there: source radiance in rgb, that depth in alpha.
-vec4 medium_at(sampler3D atlas, sampler3D back, sampler3D opacity, Grid grid, vec3 p, vec3 direction, float lod,
-               float leaving)
-{
-    vec3 uvw = p / grid.size;
-    float depth = dot(abs(direction), textureLod(opacity, uvw, lod).rgb);
-    if (depth <= 0.0) {
-        return vec4(0.0);
-    }
-    vec4 front = fronts_at(atlas, grid, uvw, direction, lod);
-    // A slanted sheet that is seen from its front still turns its back along an axis or two: backs are seen where they
-    // outweigh fronts.
-    vec3 light = front.a > 0.0 ? front.rgb / front.a : vec3(0.0);
-    float backs = max(depth - 2.0 * front.a, 0.0) / depth;
-    if (leaving != 0.0) {
-        depth *= leaving > 0.0 ? 1.0 - backs : backs;
-    }
-    if (backs > 0.0) {
-        vec4 behind = textureLod(back, uvw, lod);
-        light = mix(light, behind.a > 0.0 ? behind.rgb / behind.a : vec3(0.0), backs);
-    }
-    return vec4(light, depth * OPAQUE);
+    return textureLod(atlas, vec3((uvw.x + float(part & 1)) / 2.0, uvw.y, (uvw.z + float(part >> 1)) / 3.0), lod);
 }
