@@ -18,6 +18,7 @@ class Source:
 
     kind: str
     text: str
+    detail: str = ""  # what its light is made of, where the pass's name does not say
 
 
 # Setting -> (graph resource that carries the effect, what is missing where only that one is there), the best first.
@@ -39,7 +40,7 @@ def source_of(technique: str, effect: str) -> Source:
         for task in passes:
             if any(write.name == resource for write in task.writes):
                 text = f"{task.title} ({caveat})" if caveat else task.title
-                return Source("own" if _is_own(task) else "shared", text)
+                return Source("own" if _is_own(task) else "shared", text, task.source)
     return Source("none", f"no pass of this technique makes it ({RESOURCES[effect][0][0]})")
 
 

@@ -123,11 +123,12 @@ class Pass:
 
     ``rate`` is ``static`` (run only when stale: a stamp in ``depends``, a setting in ``settings`` or a static input has
     changed) or ``subframe`` (every time; ``Planned.stale`` then tells what of it is still good). ``shaders`` maps a key to
-    stages (see ``GL.program``). ``figure`` names the paper's box.
+    stages (see ``GL.program``). ``figure`` names the paper's box; ``source`` says where its light is from if that is not plain.
     """
 
     title: ClassVar[str] = ""
     figure: ClassVar[str] = ""
+    source: ClassVar[str] = ""
     reads: ClassVar[tuple[str | Optional, ...]] = ()
     writes: ClassVar[tuple[Texture | Buffer, ...]] = ()
     uniforms: ClassVar[tuple[Uniform, ...]] = ()

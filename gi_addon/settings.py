@@ -175,8 +175,10 @@ class LPVSettings:
         high=512, higher="reaches farther", lower="dark far from lit surfaces; slower than 0 all the same",
     )  # fmt: skip
     directions: str = _setting(
-        "72", "Directions", "Directions that light travels in through the grid",
-        choices=(("48", "48", "Faster; small bright patches may show as rays"), ("72", "72", "Smoother")),
+        "AUTO", "Directions", "Directions that light travels in through the grid; too few for a fine grid show as rays",
+        choices=(("AUTO", "Automatic", "72 up to 32 cells, 144 up to 64, 288 for more"),
+                 ("48", "48", "Fastest"), ("72", "72", "For 32 cells"), ("144", "144", "For 64 cells"),
+                 ("288", "288", "For 128 cells")),
     )  # fmt: skip
     glossy_rays: int = _setting(
         2, "Glossy Rays", "Rays through the grid per pixel and sub-frame for glossy reflections", low=1, high=64,

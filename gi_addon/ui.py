@@ -154,6 +154,10 @@ class QUARTET_PT_effects(_Panel, bpy.types.Panel):
             row.active = False
             row.label(text=f"{_KINDS[source.kind]}: {source.text}" if source.kind != "none" else source.text,
                       icon=_ICONS[source.kind])  # fmt: skip
+            if source.detail:
+                row = column.row()
+                row.active = False
+                row.label(text=source.detail, icon="BLANK1")
             why = left_out.get(source.text)
             if getattr(settings, effect) and why:
                 row = column.row()

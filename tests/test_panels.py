@@ -232,6 +232,12 @@ def test_presets_hold_valid_values():
             assert path in known or path.split(".")[0] in ("lpv", "vct", "ssdo"), path
 
 
+def test_the_paper_preset_leaves_nothing_behind():
+    """Every preset of ours names what the paper's changes but the number of bounces, which is the user's."""
+    for name, preset in presets.PRESETS.items():
+        assert name == "PAPER" or set(presets.PRESETS["PAPER"].values) - {"bounces"} <= set(preset.values), name
+
+
 @pytest.mark.parametrize("technique", sorted(TECHNIQUES))
 def test_every_effect_names_its_source(technique):
     """From the passes themselves: an own or a shared pass that is really there, or why there is none."""

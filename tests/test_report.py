@@ -459,3 +459,18 @@ def test_the_command_compares_scenes_with_peers(gl, blender, tmp_path, monkeypat
     assert CliRunner().invoke(main, ["compare", "builtin:nowhere", "--sweep", "quick"]).exit_code != 0
     assert CliRunner().invoke(main, ["compare"]).exit_code != 0
     assert "cycles and eevee" in CliRunner().invoke(main, ["compare", "builtin:cornell", "--peers", "luxcore"]).output
+
+
+@pytest.mark.blender
+def test_the_command_fills_the_table_of_effects(gl, blender, tmp_path, monkeypatch):
+    """Reference, technique, page and JSON of one effect, through Blender."""
+    from gi_addon.cli import main
+
+    monkeypatch.setenv("QUARTET_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr(effects, "JUDGED", {"shadows": effects.JUDGED["shadows"]})
+    options = ["--effects", "--techniques", "ssdo", "--resolution", "32x18", "--reference-samples", "64"]
+    result = CliRunner().invoke(main, ["compare", *options, "-o", str(tmp_path / "o")])
+    assert result.exit_code == 0, result.output
+    (cell,) = json.loads((tmp_path / "o" / "effects.json").read_text())["cells"]
+    assert cell["effect"] == "shadows" and cell["gain"] == pytest.approx(1.0, abs=0.1) and cell["off_rel_mse"] > cell["rel_mse"]
+    assert "Table 1 with numbers" in (tmp_path / "o" / "report.html").read_text()

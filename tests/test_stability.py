@@ -50,6 +50,15 @@ def test_the_suite_notices_a_technique_without_light(gl, removed, key):
             suite.close()
 
 
+def test_no_light_is_no_tight_wall(gl, monkeypatch):
+    """Where nothing reaches the lit room nothing leaks: a failure, and of screen space what it cannot be asked."""
+    monkeypatch.setattr(Suite, "indirect", lambda self, scene, **values: np.zeros((self.size[1], self.size[0], 3)))
+    for technique, verdict in (("LPV", FAIL), ("SSDO", stability.NOT_APPLICABLE)):
+        suite = Suite(technique)
+        assert run_one(suite, "5").verdict == verdict
+        suite.close()
+
+
 def test_the_suite_notices_a_factor_of_two(gl, monkeypatch):
     suite = Suite("RSM")
     true = suite.indirect

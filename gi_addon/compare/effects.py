@@ -177,9 +177,10 @@ def command(techniques: list[str], size: tuple[int, int], samples: int, output: 
     names = list(techniques or TECHNIQUES)
     by = {(c.technique, c.effect): c for c in cells}
     table = Table("effect", *names, title="Table 1: verdict, relMSE, gain; the paper's verdict")
-    for effect, title in EFFECTS.items():
+    for effect in JUDGED:
         row = [by[(t, effect)] for t in names]
-        table.add_row(title, *(f"{c.verdict}, {number(c.score.rel_mse)}, {number(c.score.gain)}; {c.paper}" for c in row))
+        cells_of = (f"{c.verdict}, {number(c.score.rel_mse)}, {number(c.score.gain)}; {c.paper}" for c in row)
+        table.add_row(EFFECTS[effect], *cells_of)
     Console().print(table)
     output.mkdir(parents=True, exist_ok=True)
     (output / "effects.json").write_text(dump(as_json(cells)))

@@ -64,9 +64,9 @@ KNOWN: dict[tuple[str, str], str] = {
     ("SSDO", "6"): "the lit floor's edge moves by whole pixels, ± 2.5 % at the wall's top: .013; 4 sub-frames leave .007",
     ("RSM", "3"): "the brightest pixel is at 1.012, by the noise of the world's few directions; the mean holds",
     ("SSDO", "3"): "the brightest pixel is at 1.015, by the noise of the world's few directions; the mean holds",
-    ("LPV", "1"): "a lamp 0.2 R from the wall: g = 0.85 in a grid of 32 cells; lamps further off pass",
-    ("LPV", "13"): "small bright patches show as rays of the ordinates: the error grows by 48 % from one grid to the next finer",
-    ("LPV", "14"): "10.3 % between 0 and 45 degrees in a grid of 32 cells",
+    ("LPV", "1"): "a lamp 0.2 R from the wall: g = 0.87 in a grid of 32 cells. The lit patch's grazing light to its own curved "
+    "surroundings passes below the grid's steps: around it L is 0.6 of what it should be, one cell higher 0.97; keeping L past "
+    "the steps gives 0.97, but does not keep flux",
     ("VCT", "3"): "the brightest pixel is at 1.016, by the noise of the world's few directions; the mean holds",
     ("VCT", "10"): "axes of cones either meet a small source or not: 4.6 % in 16 sub-frames, 2.3 % with four times the cones",
 }

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import math
+
 from .page import chart, data_uri, document, esc, number, picture, table
 from .stability import ERROR, FAIL, KNOWN, NATURE, NOT_APPLICABLE, PASS, REPORTED, TESTS, Curve, Finding
 
@@ -13,14 +15,20 @@ def _figure(curve: Curve):
     import plotly.graph_objects as go
 
     figure = go.Figure([go.Scatter(x=curve.x, y=y, name=name, mode="lines+markers") for name, y in curve.lines.items()])
+    # A line on a logarithmic axis stands at its value, a text at its logarithm.
     for name, level in curve.limits.items():
-        figure.add_hline(y=level, line={"color": "#b3261e", "dash": "dash", "width": 1}, annotation={"text": name})
+        figure.add_hline(y=level, line={"color": "#d0453a", "dash": "dash", "width": 1})
+        y = math.log10(level) if curve.log_y else level
+        figure.add_annotation(x=1, xref="paper", xanchor="right", y=y, yanchor="bottom", text=name, showarrow=False)
     for name, place in curve.marks.items():
-        figure.add_vline(x=place, line={"color": "#888", "dash": "dot", "width": 1}, annotation={"text": name})
+        figure.add_vline(x=place, line={"color": "#888", "dash": "dot", "width": 1})
+        x = math.log10(place) if curve.log_x else place
+        figure.add_annotation(x=x, xanchor="left", y=1, yref="paper", yanchor="top", text=name, showarrow=False)
     figure.update_layout(
         template="simple_white",
         height=280,
-        margin={"l": 60, "r": 20, "t": 36, "b": 44},
+        margin={"l": 60, "r": 36, "t": 40, "b": 44},
+        legend={"orientation": "h", "x": 1, "xanchor": "right", "y": 1.0, "yanchor": "bottom"},
         title={"text": curve.title, "font": {"size": 14}},
         xaxis={"title": curve.x_title, "type": "log" if curve.log_x else "linear"},
         yaxis={"title": curve.y_title, "type": "log" if curve.log_y else "linear"},

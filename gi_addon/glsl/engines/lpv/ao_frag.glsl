@@ -27,7 +27,7 @@ void main()
     for (int i = 0; i < ao_directions; ++i) {
         vec2 u = fract(sobol_2d(view.subframe * uint(ao_directions) + uint(i), 20u) + vec2(turn, turn * 7.0)); // 7: prime to 16
         vec3 direction = frame * warp_cosine_hemisphere(u);
-        sum += dot(direction, ng) > 0.0 ? march_walls(from, direction, ao_distance / grid_cell).open_share : 0.0;
+        sum += dot(direction, ng) > 0.0 ? open_share(from, direction, ao_distance / grid_cell) : 0.0;
     }
     ao_raw = vec2(sum / float(ao_directions), 1.0);
 }

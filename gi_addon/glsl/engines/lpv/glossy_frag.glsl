@@ -1,14 +1,18 @@
-// Glossy reflections from the volume: rays of the lobe's visible normals, each carried through the grid to the wall it meets
-// (A. Kaplanyan, "Light Propagation Volumes in CryEngine 3", SIGGRAPH course 2009, sums harmonics along the one mirrored ray;
-// paper §V). Lights, emissive surfaces and the world as mirrored are direct light, as in Cycles, and not in here.
+// Glossy reflections: rays of the lobe's visible normals, each to the surface it meets, and that surface's radiance. What a
+// light gives the surface is in that light's RSM (raycast_lib.glsl), bounces are in the volume in front of it (bounces_lib.glsl),
+// and what the picture shows is taken from there. (A. Kaplanyan, "Light Propagation Volumes in CryEngine 3", SIGGRAPH course
+// 2009, and the paper's §V sum the volume's harmonics along the one mirrored ray. Orders 0 to 2 of what arrives at a wall ring on
+// the side that it does not come from: that gave unlit walls a third of the lit ones' radiance, in other colours.) Lights,
+// emissive surfaces and the world as mirrored are direct light, as in Cycles, and not in here.
 //
 // A ray drawn by the visible normals (E. Heitz 2018) weighs F G2/G1, whatever the roughness.
 
 #include "lib/view_lib.glsl"
 #include "lib/bsdf_lib.glsl"
 #include "lib/sequence_lib.glsl"
-#include "engines/lpv/geometry_lib.glsl"
-#include "engines/lpv/march_lib.glsl"
+#define RAY_BOUNCES 1
+#include "engines/rsm/raycast_lib.glsl"
+#include "engines/lpv/bounces_lib.glsl"
 
 void main()
 {
@@ -32,7 +36,6 @@ void main()
     vec3 v_local = v * frame;
     v_local.z = max(v_local.z, 1e-4); // shading normals can face away from the eye
     float alpha = max(sqr(lobe.roughness), ALPHA_MIN);
-    vec3 from = (position_ws - grid_origin) / grid_cell + ng * half_cell_shift(ng);
     // Each pixel turns the sequence by its own number (R. Cranley and T. Patterson, 1976).
     uint seed = hash_u32(uvec2(pixel + view.pixel_offset));
     vec2 turn = unit_shift(seed);
@@ -46,7 +49,13 @@ void main()
             continue;
         }
         float g2_g1 = ggx_visible_weight(v_local.z, l_local.z, alpha);
-        sum += fresnel(lobe, saturate(dot(v_local, h))) * g2_g1 * march_walls(from, l, 1e9).radiance;
+        bool hit;
+        float distance;
+        vec3 radiance = rsm_ray(position_ws, l, ng, u.x, hit, distance);
+#if HAS_MEDIUM
+        radiance *= medium_transmittance(position_ws, l, distance);
+#endif
+        sum += fresnel(lobe, saturate(dot(v_local, h))) * g2_g1 * radiance;
     }
     vec3 gain = multiscatter_gain(brdf_energy, brdf_average, lobe, saturate(abs(dot(n, v))));
     indirect_glossy = vec4(gain * sum / float(glossy_rays), 1.0);

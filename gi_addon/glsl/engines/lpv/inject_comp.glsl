@@ -7,7 +7,7 @@
 // leaves no bias.
 
 #include "engines/rsm/rsm_lib.glsl"
-#include "engines/lpv/lpv_lib.glsl"
+#include "engines/lpv/geometry_lib.glsl"
 #include "lib/sequence_lib.glsl"
 #include "lib/view_lib.glsl"
 
@@ -35,11 +35,11 @@ void main()
             t.flux /= 1.0 + facing * PI * sqr(light.patch_radius) * float(view.subframes);
         }
     }
-    vec3 at = (t.position_ws - grid_origin) / grid_cell + t.normal_ws * half_cell_shift(t.normal_ws);
+    vec3 at = (t.position_ws - grid_origin) / grid_cell;
     if (any(lessThan(at, vec3(-1.0))) || any(greaterThan(at, vec3(grid_size) + 1.0))) {
         return; // a backdrop far outside (gi_addon/focus.py)
     }
-    ivec3 cell = clamp(ivec3(floor(at)), ivec3(0), grid_size - 1);
+    ivec3 cell = cell_in_front(at, t.normal_ws, grid_size);
     int base = cell_index(cell, grid_size) * SH_COUNT * 3;
     float y[SH_COUNT];
     sh_basis(t.normal_ws, y);

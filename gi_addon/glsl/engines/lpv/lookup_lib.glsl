@@ -11,26 +11,6 @@ struct VolumeSample {
     float weight; // of the eight cells, how much stands on the open side of the walls
 };
 
-#if HAS_LPV_WALLS
-// Share of the way from `at` to the centre of `cell` that no wall blocks, as far as the face between the layers `upper` − 1 and
-// `upper` along `axis` tells in the column through `column`.
-float open_between(vec3 at, ivec3 cell, ivec3 column, int axis, int upper)
-{
-    column[axis] = upper;
-    if (!inside_grid(column, grid_size) || upper == 0) {
-        return 1.0;
-    }
-    vec4 wall = lpv_walls[face_index(column, axis, grid_size)];
-    if (wall.x <= 0.0) {
-        return 1.0;
-    }
-    vec3 place = vec3(column) + 0.5;
-    place[axis] += wall.y - 1.0;
-    vec3 n = wall_normal(wall, axis);
-    return dot(at - place, n) * dot(vec3(cell) + 0.5 - place, n) < 0.0 ? 1.0 - wall.x : 1.0;
-}
-#endif
-
 // The eight cells around grid point `at`, trilinear; a cell behind the tangent plane of `surface` (a grid point, unit normal
 // `n`) does not count, nor one behind a wall that stands between `at` and its layer, in its own column or in the one of `at`.
 VolumeSample volume_sample(vec3 at, vec3 surface, vec3 n)
@@ -53,10 +33,7 @@ VolumeSample volume_sample(vec3 at, vec3 surface, vec3 n)
         // From the plane to half a cell in front of it, so that no cell appears at once.
         weight *= saturate(2.0 * dot(vec3(cell) + 0.5 - surface, n));
 #if HAS_LPV_WALLS
-        for (int axis = 0; axis < 3; ++axis) {
-            int upper = int(base[axis]) + 1;
-            weight *= min(open_between(at, cell, cell, axis, upper), open_between(at, cell, ivec3(floor(at)), axis, upper));
-        }
+        weight *= open_way(at, cell);
 #endif
         if (weight > 0.0) {
             for (int c = 0; c < SH_COUNT; ++c) {
@@ -72,13 +49,13 @@ VolumeSample volume_sample(vec3 at, vec3 surface, vec3 n)
     return s;
 }
 
-// In front of a surface seen from `eye_ws` (unit vector towards it). What the eye sees is on the open side of all walls, which a
-// point on an edge would not tell: it is moved to the eye so far that walls, whose places are rounded to 1/255, are passed by
-// lines of sight 5° and more off them.
-VolumeSample volume_at_surface(vec3 position_ws, vec3 ng, vec3 eye_ws)
+// Half a cell in front of a surface at grid point `surface` seen from `eye` (unit vector towards it); cells behind it count
+// nothing, so it need not be farther off for walls at an angle. What the eye sees is on the open side
+// of all walls, which a point on an edge would not tell: it is moved to the eye so far that walls, whose places are rounded to
+// 1/255, are passed by lines of sight 5° and more off them.
+VolumeSample volume_in_front(vec3 surface, vec3 ng, vec3 eye)
 {
-    vec3 surface = (position_ws - grid_origin) / grid_cell;
-    return volume_sample(surface + ng * half_cell_shift(ng) + eye_ws * 0.05, surface, ng);
+    return volume_sample(surface + ng * 0.5 + eye * 0.05, surface, ng);
 }
 
 // E/π on a surface of unit normal n. Harmonics of order 2 of light from a side go below 0 behind it by a few per cent.

@@ -9,9 +9,11 @@
 // that without surfaces flux is conserved exactly; an isotropic field in a closed black cavity is exact too.
 //
 // Walls at an angle to the grid. Their steps are more area than the wall (|n|₁ times), and would take too much light. With n
-// turned to the cell's side: a blocked face ahead whose surface the light does not meet (ω·n ≥ 0) lets nothing through and
-// takes nothing; a blocked face behind, from which such light could not come (ω·n < 0), is no gap in what arrives. Neither
-// counts as cross-section, so that the cell's radiance is its flux over the rest:
+// turned to the cell's side, P = Σ max(ω_a n_a, 0) and M = Σ max(−ω_a n_a, 0) over the axes, a wall of area A has steps of
+// A P in the ordinate's back and of A M in its way, and sends A (P − M) of light where that is positive (ω·n ≥ 0). Then steps
+// in the way let nothing through and take nothing, and of those in the back the share M/P is no gap in what arrives, but air
+// between the steps. Where ω·n < 0 the steps in the back are all air. Neither counts as cross-section, so that the cell's
+// radiance is its flux over the rest:
 //     L = F/K,  F = Σ_a |ω_a| (1 − κ_a) L_a + Q/h²,  K = the smaller of Σ_behind and Σ_ahead of |ω_a| (1 − κ_a [as above]).
 // What goes on is L, or less where the open faces would pass more than F; the rest of F is absorbed. An isotropic field in
 // front of a wall of any direction then stays one. Alpha holds the share of L that goes on.
@@ -24,6 +26,15 @@
 #include "engines/lpv/geometry_lib.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
+
+// min(1, M/P): the share of a step behind that is air.
+float step_share(vec3 w, vec3 n)
+{
+    vec3 parts = w * n;
+    float leaving = dot(max(parts, vec3(0.0)), vec3(1.0));
+    float meeting = -dot(min(parts, vec3(0.0)), vec3(1.0));
+    return leaving > 1e-6 ? min(meeting / leaving, 1.0) : 1.0;
+}
 
 void main()
 {
@@ -72,7 +83,7 @@ void main()
             coverage = wall.x;
             if (coverage > 0.0) {
                 vec3 n = wall_normal(wall, axis) * (up[axis] ? 1.0 : -1.0);
-                behind -= dot(w, n) < 0.0 ? share[axis] * coverage : 0.0;
+                behind -= share[axis] * coverage * step_share(w, n);
             }
 #endif
             vec4 neighbour = imageLoad(lpv_radiance, from + ivec3(0, 0, slab));

@@ -27,10 +27,7 @@ void main()
         vec3 n = normalize(wall_normal(wall, axis)) * ((i & 1) == 1 ? -1.0 : 1.0);
         vec3 place = vec3(upper) + 0.5;
         place[axis] += wall.y - 1.0;
-        ivec3 cell = ivec3(floor(place + n * half_cell_shift(n)));
-        if (!inside_grid(cell, grid_size)) {
-            continue;
-        }
+        ivec3 cell = cell_in_front(place, n, grid_size);
         float y[SH_COUNT];
         sh_basis(n, y);
         vec3 irradiance = vec3(0.0);

@@ -12,6 +12,16 @@
 #include "engines/rsm/gather_lib.glsl"
 #endif
 
+// What a surface that a ray has met reflects besides the light that its light's map tells: bounces, W/(m²·sr). Negative
+// `albedo`: no map shows it, and `normal_ws` is nothing. `u` in [0, 1). RSM's own are the virtual lights; who has a volume
+// defines RAY_BOUNCES and the function.
+#ifndef RAY_BOUNCES
+#define RAY_BOUNCES HAS_VPLS
+#endif
+#if RAY_BOUNCES
+vec3 ray_bounces(vec3 position_ws, vec3 normal_ws, vec3 albedo, vec3 direction, float u);
+#endif
+
 // Runs of occupied cells that a ray may graze before it is given up.
 const int RAY_RUNS = 6;
 // Points of a run that are compared with a map, and halvings of the interval in which the ray passes the surface.
@@ -89,7 +99,7 @@ vec3 rsm_ray(vec3 origin_ws, vec3 direction, vec3 ng, float u, out bool hit, out
     float t = 0.0;
     bool free_before = true; // the run that the ray starts in counts, too: contacts
     vec3 radiance = vec3(0.0);
-    vec3 albedo = vec3(0.0);
+    vec3 albedo = vec3(-1.0);
     vec3 normal_ws = vec3(0.0);
     hit = false;
     distance = NO_SURFACE;
@@ -167,13 +177,22 @@ vec3 rsm_ray(vec3 origin_ws, vec3 direction, vec3 ng, float u, out bool hit, out
         return seen;
     }
 #endif
-#if HAS_VPLS
-    if (hit && max3(albedo) > 0.0) {
-        int stride = max(vpl_count / RAY_VPLS, 1);
-        vec3 at = origin_ws + direction * distance;
-        radiance += albedo * gather_some_vpls(at, normal_ws, normal_ws, int(u * float(stride)), stride,
-                                              float(view.subframes)).radiance;
+#if RAY_BOUNCES
+    if (hit) {
+        radiance += ray_bounces(origin_ws + direction * distance, normal_ws, albedo, direction, u);
     }
 #endif
     return radiance;
 }
+
+#if HAS_VPLS
+vec3 ray_bounces(vec3 position_ws, vec3 normal_ws, vec3 albedo, vec3 direction, float u)
+{
+    if (max3(albedo) <= 0.0) {
+        return vec3(0.0);
+    }
+    int stride = max(vpl_count / RAY_VPLS, 1);
+    return albedo * gather_some_vpls(position_ws, normal_ws, normal_ws, int(u * float(stride)), stride,
+                                     float(view.subframes)).radiance;
+}
+#endif
