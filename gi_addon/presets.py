@@ -37,19 +37,22 @@ PRESETS: dict[str, Preset] = {
     "PREVIEW": Preset(
         "Preview", "The fastest picture worth looking at: small maps, few samples",
         {**_OURS, "samples": 1, "viewport_samples": 8, "gather_scale": 8, "shadows.resolution": 512, "ao.steps": 6,
-         "world.resolution": 256, "rsm.resolution": 256, "rsm.samples": 64, "lpv.resolution": 16, "vct.resolution": 32,
+         "world.samples": 2, "world.resolution": 256,
+         "rsm.resolution": 256, "rsm.samples": 64, "lpv.resolution": 16, "vct.resolution": 32,
          "vct.cones": 12, "ssdo.samples": 64},
     ),
     "BALANCED": Preset(
         "Balanced", "The defaults: about the time of Cycles with one denoised sample",
         {**_OURS, "samples": 16, "viewport_samples": 16, "gather_scale": 4, "shadows.resolution": 1024, "ao.steps": 12,
-         "world.resolution": 512, "rsm.resolution": 512, "rsm.samples": 200, "lpv.resolution": 32, "vct.resolution": 64,
+         "world.samples": 4, "world.resolution": 512,
+         "rsm.resolution": 512, "rsm.samples": 200, "lpv.resolution": 32, "vct.resolution": 64,
          "vct.cones": 12, "ssdo.samples": 256},
     ),
     "FINAL": Preset(
         "Final", "Smooth edges, shadows and bounce light for stills",
         {**_OURS, "samples": 64, "viewport_samples": 64, "gather_scale": 2, "shadows.resolution": 2048, "ao.steps": 16,
-         "world.resolution": 1024, "rsm.resolution": 512, "rsm.samples": 400, "lpv.resolution": 64, "vct.resolution": 128,
+         "world.samples": 4, "world.resolution": 1024,
+         "rsm.resolution": 512, "rsm.samples": 400, "lpv.resolution": 64, "vct.resolution": 128,
          "vct.cones": 24, "ssdo.samples": 256},
     ),
 }  # fmt: skip

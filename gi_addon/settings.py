@@ -103,7 +103,7 @@ class WorldSettings:
     """Light from the world, taken as a few distant suns per sub-frame."""
 
     samples: int = _setting(
-        2, "Directions", "Directions of the world's light per sub-frame, each with its own shadow map",
+        4, "Directions", "Directions of the world's light per sub-frame, each with its own shadow map",
         low=1, high=64, higher="smoother sky light", lower="faster",
     )  # fmt: skip
     resolution: int = _setting(

@@ -100,3 +100,16 @@ def test_a_switched_off_effect_costs_nothing(gl, off):
     assert len(without.plan.run) < len(on.plan.run)
     assert without.plan.nbytes() < on.plan.nbytes()
     assert any("switched off" in reason for _, reason in without.plan.skipped)
+
+
+@pytest.mark.parametrize("technique", list(TECHNIQUES))
+def test_mirrors_show_lit_surfaces_without_indirect_diffuse_light(gl, technique):
+    """A switch takes its own passes away. What is lit by lamps is in mirrors still; what is lit by it may be missing there."""
+    scene = scenes.effect("glossy")
+    on, off = (
+        make(scene, "Diffuse Indirect", "Glossy Indirect", resolution=(32, 18), technique=technique, samples=4,
+             use_indirect_diffuse=switch).passes
+        for switch in (True, False)
+    )  # fmt: skip
+    assert not off["Diffuse Indirect"].any()
+    assert on["Glossy Indirect"].mean() >= off["Glossy Indirect"].mean() > 0.5 * on["Glossy Indirect"].mean()

@@ -481,7 +481,8 @@ def fog(density):
 @pytest.mark.parametrize(
     ("setting", "gone"),
     [
-        ("use_indirect_diffuse", "LPV Propagation"), ("use_glossy", "LPV Glossy Computation"), ("use_ao", "LPV AO Generation"),
+        ("use_indirect_diffuse", "LPV Lighting Computation"), ("use_glossy", "LPV Glossy Computation"),
+        ("use_ao", "LPV AO Generation"),
         ("use_translucency", "LPV Translucency"), ("lpv.occlusion", "LPV Geometry Injection"),
     ],
 )  # fmt: skip

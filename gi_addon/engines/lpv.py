@@ -33,7 +33,9 @@ from ..passes.screen import (
     TRANSMISSION_INDIRECT,
     ScreenPass,
     _screen,
+    no_bounce,
     no_gloss,
+    no_indirect,
 )
 from ..passes.subsurface import Subsurface, SubsurfaceBack
 from ..passes.volumetric import MEDIUM_UNIFORMS, Volumetric, air, medium_defines, set_medium
@@ -142,12 +144,6 @@ def _set_grid(frame: Frame, program, facts: Facts, **more) -> None:
 _AIR_SETTINGS = ("use_volumetric", "volume.density", "volume.anisotropy")
 
 
-def _bounce_off(facts: Facts) -> str | None:
-    if not facts.settings.use_indirect_diffuse:
-        return "indirect diffuse is switched off"
-    return "bounces is 0" if facts.settings.bounces == 0 else None
-
-
 # --- ordinates --------------------------------------------------------------------------------------------------------
 
 
@@ -247,7 +243,7 @@ class RadianceInjection(Pass):
         return medium_defines(facts)
 
     def absent(self, facts: Facts) -> str | None:
-        return _bounce_off(facts)
+        return no_bounce(facts)
 
     def run(self, frame: Frame, planned: Planned) -> None:
         facts = planned.facts
@@ -508,6 +504,9 @@ class IndirectLighting(ScreenPass):
     writes = (INDIRECT_DIFFUSE,)
     uniforms = _GRID
     fragment = "engines/lpv/lighting_frag.glsl"
+
+    def absent(self, facts: Facts) -> str | None:
+        return no_indirect(facts)
 
     def prepare(self, frame: Frame, planned: Planned, program) -> None:
         _set_grid(frame, program, planned.facts)

@@ -26,6 +26,7 @@ from ..passes.screen import (
     REFRACTING,
     TRANSMISSION_INDIRECT,
     ScreenPass,
+    no_indirect,
 )
 from ..passes.subsurface import Subsurface, SubsurfaceBack
 from ..passes.surface_points import SETS, SurfacePoints, points_per_subframe
@@ -66,12 +67,6 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         Volumetric(),
         Resolve(layers),
     ]
-
-
-def _bounce_off(facts: Facts) -> str | None:
-    if not facts.settings.use_indirect_diffuse:
-        return "indirect diffuse is switched off"
-    return "bounces is 0" if facts.settings.bounces == 0 else None
 
 
 def _gather_defines(facts: Facts, *, always: bool = False) -> dict[str, int]:
@@ -116,7 +111,7 @@ class RSMFlux(Pass):
         return medium_defines(facts)
 
     def absent(self, facts: Facts) -> str | None:
-        return _bounce_off(facts)
+        return no_indirect(facts)
 
     def run(self, frame: Frame, planned: Planned) -> None:
         facts = planned.facts

@@ -25,7 +25,9 @@ from ..passes.screen import (
     TRANSMISSION_INDIRECT,
     ScreenPass,
     _screen,
+    no_bounce,
     no_gloss,
+    no_indirect,
 )
 from ..passes.smoothing import BlockSmoothing, raw_gather
 from ..passes.subsurface import Subsurface, SubsurfaceBack
@@ -69,16 +71,12 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
     ]
 
 
-def _bounce_off(facts: Facts) -> str | None:
-    if not facts.settings.use_indirect_diffuse:
-        return "indirect diffuse is switched off"
-    if facts.settings.bounces == 0:
-        return "bounces is 0"
-    return None if facts.lit or facts.glowing_voxels else "no light shines"
+def _unlit(facts: Facts) -> str | None:
+    return no_bounce(facts) or (None if facts.lit or facts.glowing_voxels else "no light shines")
 
 
 def _one_bounce(facts: Facts) -> str | None:
-    return None if facts.settings.bounces > 1 and facts.settings.use_indirect_diffuse else "one bounce needs no other"
+    return None if facts.settings.bounces > 1 else "one bounce needs no other"
 
 
 class RadianceInjection(Pass):
@@ -200,7 +198,7 @@ class InterpolatedIndirect(ScreenPass):
     def absent(self, facts: Facts) -> str | None:
         if facts.settings.gather_scale == 1:
             return "every pixel gathers for itself"
-        return _bounce_off(facts)
+        return no_indirect(facts) or _unlit(facts)
 
     def prepare(self, frame: Frame, planned: Planned, program) -> None:
         _set_cones(frame, program, planned.facts)
@@ -223,7 +221,7 @@ class IndirectLighting(ScreenPass):
         return {"GATHER_SCALE": facts.settings.gather_scale}
 
     def absent(self, facts: Facts) -> str | None:
-        return _bounce_off(facts)
+        return no_indirect(facts) or _unlit(facts)
 
     def prepare(self, frame: Frame, planned: Planned, program) -> None:
         _set_cones(frame, program, planned.facts)
@@ -260,7 +258,7 @@ class GlossyCones(ScreenPass):
     fragment = "engines/vct/glossy_frag.glsl"
 
     def absent(self, facts: Facts) -> str | None:
-        return no_gloss(facts) or _bounce_off(facts)
+        return no_gloss(facts) or _unlit(facts)
 
     def prepare(self, frame: Frame, planned: Planned, program) -> None:
         _set_cones(frame, program, planned.facts)
@@ -302,7 +300,7 @@ class RefractionCones(ScreenPass):
     fragment = "engines/vct/refraction_frag.glsl"
 
     def absent(self, facts: Facts) -> str | None:
-        return _bounce_off(facts)
+        return _unlit(facts)
 
     def prepare(self, frame: Frame, planned: Planned, program) -> None:
         _set_cones(frame, program, planned.facts)

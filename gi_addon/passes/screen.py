@@ -50,6 +50,16 @@ REFRACTING = (
 )  # fmt: skip
 
 
+def no_bounce(facts: Facts) -> str | None:
+    """Why no surface lights another, or None."""
+    return "bounces is 0" if facts.settings.bounces == 0 else None
+
+
+def no_indirect(facts: Facts) -> str | None:
+    """Why diffuse surfaces show no light of others, or None."""
+    return no_bounce(facts) if facts.settings.use_indirect_diffuse else "indirect diffuse is switched off"
+
+
 def no_gloss(facts: Facts) -> str | None:
     """Why nothing is to be mirrored, or None."""
     if not facts.settings.use_glossy:
