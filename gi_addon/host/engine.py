@@ -234,7 +234,10 @@ class QuartetEngine(bpy.types.RenderEngine):
         self._viewport.draw(context, depsgraph)
 
     def __del__(self) -> None:
-        viewport = self._viewport
+        try:
+            viewport = self._viewport
+        except ReferenceError:  # Blender's side is gone already, as after a final render, which has none
+            return
         if viewport is not None:
             viewport.close()
 

@@ -8,13 +8,11 @@
 
 #include "passes/gather_receiver.glsl"
 
-// Share of the bilinear weight that must be on the pixel's surface: all of it but for rounding. With a neighbour missing, light
-// that falls off towards an edge would be taken from one side of the pixel only, and jump as the grid moves.
-const float ENOUGH = 0.99;
-
 float linear_irradiance(vec4 direction, vec3 n) { return max(0.25 * direction.w + 0.5 * dot(direction.xyz, n), 0.0); }
 
-// False where too little of the neighbourhood is this surface: gather afresh.
+// False where a neighbour is of another surface: gather afresh. With one missing, light that falls off towards an edge would be
+// taken from one side of the pixel only, and jump as the grid moves; and so it would with one of no weight, since a block that
+// holds an edge may stand for a pixel off its middle.
 bool interpolated_indirect(vec3 position_ws, vec3 n, vec3 ng, float depth, out vec3 radiance)
 {
     float scale = float(GATHER_SCALE);
@@ -23,25 +21,21 @@ bool interpolated_indirect(vec3 position_ws, vec3 n, vec3 ng, float depth, out v
     ivec2 base = ivec2(floor(at));
     vec2 f = at - vec2(base);
     ivec2 last = textureSize(low_depth, 0) - 1;
-    vec3 sum = vec3(0.0);
-    float weight = 0.0;
+    radiance = vec3(0.0);
     for (int k = 0; k < 4; ++k) {
         ivec2 corner = ivec2(k & 1, k >> 1);
         ivec2 block = clamp(base + corner, ivec2(0), last);
         Receiver other = gather_receiver(block);
         // Off the plane by less than half a block's width: the same surface, seen from here.
         if (!on_surface(other, position_ws, ng, 0.5 * scale * pixel_width(depth))) {
-            continue;
+            return false;
         }
         vec2 s = mix(1.0 - f, f, vec2(corner));
-        float w = max(s.x * s.y, 1e-3);
         vec4 direction = texelFetch(low_direction, block, 0);
         float from = linear_irradiance(direction, other.n);
         // Turning may dim to nothing, and brighten by the two-fold at most that 25° can make of an even sky.
         float turn = from > 0.0 ? min(linear_irradiance(direction, n) / from, 2.0) : 1.0;
-        sum += w * turn * texelFetch(low_indirect, block, 0).rgb;
-        weight += w;
+        radiance += s.x * s.y * turn * texelFetch(low_indirect, block, 0).rgb;
     }
-    radiance = weight > 0.0 ? sum / weight : vec3(0.0);
-    return weight >= ENOUGH;
+    return true;
 }
