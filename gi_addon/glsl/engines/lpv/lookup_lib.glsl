@@ -55,7 +55,7 @@ VolumeSample volume_sample(vec3 at, vec3 surface, vec3 n)
 // 1/255, are passed by lines of sight 5° and more off them.
 VolumeSample volume_in_front(vec3 surface, vec3 ng, vec3 eye)
 {
-    return volume_sample(surface + ng * 0.5 + eye * 0.05, surface, ng);
+    return volume_sample(surface + ng * 0.5 + eye * 0.05, surface, ng); // 1/255 / sin 5° = .045
 }
 
 // E/π on a surface of unit normal n. Harmonics of order 2 of light from a side go below 0 behind it by a few per cent.
