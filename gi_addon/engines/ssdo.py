@@ -30,10 +30,13 @@ from ..passes.screen import (
     LIGHT,
     LOBE,
     REFRACTING,
+    SCATTERED,
+    SUBSURFACE,
     TRANSMISSION_INDIRECT,
     ScreenPass,
     _screen,
     no_gloss,
+    no_translucency,
 )
 from ..passes.smoothing import BlockSmoothing, raw_gather
 from ..passes.volumetric import Volumetric
@@ -399,17 +402,13 @@ class Subsurface(ScreenPass):
     title = "SSDO Subsurface Scattering"
     reads = (
         "gbuffer.subsurface", "gbuffer.depth", "gbuffer.normal", "gbuffer.diffuse",
-        Optional("direct.diffuse", ("subsurface.direct",)), Optional("indirect.diffuse", ("subsurface.indirect",)),
+        *SCATTERED,
     )  # fmt: skip
-    writes = (
-        Texture("subsurface.direct", "subsurface_direct", "direct.diffuse after scattering below the surface; its share of "
-                "the surface's colour", "rgba32f", _screen),
-        Texture("subsurface.indirect", "subsurface_indirect", "the same of indirect.diffuse", "rgba32f", _screen),
-    )  # fmt: skip
+    writes = SUBSURFACE
     fragment = "engines/ssdo/subsurface_frag.glsl"
 
     def absent(self, facts: Facts) -> str | None:
-        return None if facts.settings.use_translucency else "translucency is switched off"
+        return no_translucency(facts)
 
 
 class RadialBlur(Volumetric):

@@ -10,7 +10,7 @@ from ..facts import Facts
 from ..frame import Frame
 from ..graph import Optional, Pass, Planned, Texture
 from ..scene import CAMERA
-from .screen import ScreenPass, _screen
+from .screen import ScreenPass, _screen, no_translucency
 
 BACKGROUND_DEPTH = 0.0  # no surface: view depths are positive
 
@@ -51,25 +51,7 @@ class GBuffer(Pass):
         return None if facts.visible else "the camera has no surface to see"
 
     def run(self, frame: Frame, planned: Planned) -> None:
-        fbo = frame.targets(planned)
-        fbo.use()
-        fbo.scissor = None
-        fbo.viewport = (0, 0, *fbo.size)
-        fbo.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
-        frame.gl.ctx.enable_only(moderngl.DEPTH_TEST)
-        frame.bind(planned)
-        frame.gpu.draw(
-            planned,
-            {"vertex": "surface/surface_vert.glsl", "fragment": "passes/gbuffer_frag.glsl"},
-            CAMERA,
-            np.ascontiguousarray(frame.view["clip_from_world"]),
-            full=True,
-            units=len(planned.texture_reads()),
-            defines={
-                "SURFACE_TABLES": int(planned.has("brdf.albedo")), "SURFACE_SEE_THROUGH_GLASS": 1, "SURFACE_SEEN_BY_CAMERA": 1,
-                "SURFACE_SEEN_BY_SHADOW": 0,
-            },
-        )  # fmt: skip
+        draw_for_camera(frame, planned, "passes/gbuffer_frag.glsl")
 
 
 class TranslucentLayer(Pass):
@@ -97,7 +79,7 @@ class TranslucentLayer(Pass):
         return _nothing_refracts(facts)
 
     def run(self, frame: Frame, planned: Planned) -> None:
-        _draw_translucent(frame, planned, clear=0.0, mode=moderngl.DEPTH_TEST)
+        _draw_translucent(frame, planned)
 
 
 class TranslucentBack(Pass):
@@ -116,9 +98,7 @@ class TranslucentBack(Pass):
         return _nothing_refracts(facts)
 
     def run(self, frame: Frame, planned: Planned) -> None:
-        frame.gl.ctx.depth_func = ">"
-        _draw_translucent(frame, planned, clear=0.0, mode=moderngl.DEPTH_TEST, far=0.0)
-        frame.gl.ctx.depth_func = "<"
+        _draw_translucent(frame, planned, far=0.0)
 
 
 class TranslucentTint(Pass):
@@ -144,36 +124,49 @@ class TranslucentTint(Pass):
 
 
 def _nothing_refracts(facts: Facts) -> str | None:
-    if not facts.settings.use_translucency:
-        return "translucency is switched off"
-    return None if facts.transmissive else "no visible material refracts"
+    return no_translucency(facts) or (None if facts.transmissive else "no visible material refracts")
 
 
-def _draw_translucent(
-    frame: Frame, planned: Planned, *, clear: float, mode: int, far: float = 1.0
-) -> None:
+def _draw_translucent(frame: Frame, planned: Planned, **options) -> None:
+    draw_for_camera(
+        frame, planned, "passes/translucent_frag.glsl", "transmissive", **options,
+        defines={
+            "TINT_ONLY": int(planned.has("gbuffer.transmission")),
+            **{f"HAS_{w.glsl.upper()}": int(planned.has(w.name)) for w in (*TranslucentLayer.writes, *TranslucentBack.writes)},
+        },
+    )  # fmt: skip
+
+
+def draw_for_camera(
+    frame: Frame, planned: Planned, fragment: str, only: str = "", *, clear: float = 0.0, mode: int = moderngl.DEPTH_TEST,
+    far: float = 1.0, defines: dict[str, int] | None = None,
+) -> None:  # fmt: skip
+    """Draw what the camera sees into the pass's targets: all of it, or what is ``only`` "transmissive" or "subsurface".
+
+    ``clear`` is the targets' value where nothing is, ``far`` the depth buffer's; 0 asks for the farthest surfaces.
+    """
     fbo = frame.targets(planned)
     fbo.use()
     fbo.scissor = None
     fbo.viewport = (0, 0, *fbo.size)
     fbo.clear(clear, clear, clear, clear, depth=far)
     frame.gl.ctx.enable_only(mode)
+    frame.gl.ctx.depth_func = ">" if far == 0.0 else "<"
     frame.bind(planned)
     frame.gpu.draw(
         planned,
-        {"vertex": "surface/surface_vert.glsl", "fragment": "passes/translucent_frag.glsl"},
+        {"vertex": "surface/surface_vert.glsl", "fragment": fragment},
         CAMERA,
         np.ascontiguousarray(frame.view["clip_from_world"]),
         full=True,
-        only="transmissive",
+        only=only,
         units=len(planned.texture_reads()),
         defines={
-            "SURFACE_TABLES": int(planned.has("brdf.albedo")), "SURFACE_SEE_THROUGH_GLASS": 1,
-            "SURFACE_SEEN_BY_CAMERA": 1, "SURFACE_SEEN_BY_SHADOW": 0,
-            "TINT_ONLY": int(planned.has("gbuffer.transmission")),
-            **{f"HAS_{w.glsl.upper()}": int(planned.has(w.name)) for w in (*TranslucentLayer.writes, *TranslucentBack.writes)},
+            "SURFACE_TABLES": int(planned.has("brdf.albedo")), "SURFACE_SEE_THROUGH_GLASS": 1, "SURFACE_SEEN_BY_CAMERA": 1,
+            "SURFACE_SEEN_BY_SHADOW": 0, **(defines or {}),
         },
     )  # fmt: skip
+    frame.gl.ctx.depth_func = "<"
 
 
 class GBufferMips(ScreenPass):

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from ..facts import Facts
 from ..frame import FULLSCREEN, Frame
-from ..graph import Pass, Planned, Texture
+from ..graph import Optional, Pass, Planned, Texture
 
 LIGHT = "radiance a white Lambert surface would reflect, W/(m²·sr)"
 
@@ -40,14 +40,28 @@ INDIRECT_GLOSSY = Texture("indirect.glossy", "indirect_glossy", "radiance that t
                           "W/(m²·sr)", "rgba32f", _screen)  # fmt: skip
 TRANSMISSION_INDIRECT = Texture("transmission.indirect", "transmission_indirect", "radiance through refracting surfaces, "
                                 "tinted; alpha 1 where the ray met something", "rgba32f", _screen)  # fmt: skip
+SUBSURFACE = (
+    Texture("subsurface.direct", "subsurface_direct", "direct.diffuse after scattering below the surface; its share of "
+            "the surface's colour", "rgba32f", _screen),
+    Texture("subsurface.indirect", "subsurface_indirect", "the same of indirect.diffuse", "rgba32f", _screen),
+)  # fmt: skip
 
 # Of a surface that reflects, besides where it is: its lobe (lib/bsdf_lib.glsl).
 LOBE = ("gbuffer.specular", "gbuffer.lobe", "brdf.energy", "brdf.average")
+# What scatters below a surface: its own light.
+SCATTERED = (
+    Optional("direct.diffuse", ("subsurface.direct",)), Optional("indirect.diffuse", ("subsurface.indirect",)),
+)  # fmt: skip
 # Of a surface that refracts (lib/refraction_lib.glsl).
 REFRACTING = (
     "gbuffer.transmission", "translucent.depth", "translucent.normal", "translucent.color", "translucent.medium",
     "translucent.back_depth", "translucent.back_normal",
 )  # fmt: skip
+
+
+def no_translucency(facts: Facts) -> str | None:
+    """Why no light gets through surfaces, or None."""
+    return None if facts.settings.use_translucency else "translucency is switched off"
 
 
 def no_bounce(facts: Facts) -> str | None:

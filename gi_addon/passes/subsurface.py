@@ -3,19 +3,12 @@
 
 from __future__ import annotations
 
-import moderngl
-import numpy as np
-
 from ..facts import Facts
 from ..frame import Frame
 from ..graph import Optional, Pass, Planned, Texture, Uniform
-from ..scene import CAMERA
-from .screen import ScreenPass, _screen
+from .gbuffer import draw_for_camera
+from .screen import SCATTERED, SUBSURFACE, ScreenPass, _screen, no_translucency
 from .volumetric import MEDIUM_UNIFORMS, medium_defines, set_medium
-
-
-def _off(facts: Facts) -> str | None:
-    return None if facts.settings.use_translucency else "translucency is switched off"
 
 
 class SubsurfaceBack(Pass):
@@ -33,31 +26,10 @@ class SubsurfaceBack(Pass):
     )  # fmt: skip
 
     def absent(self, facts: Facts) -> str | None:
-        return _off(facts)
+        return no_translucency(facts)
 
     def run(self, frame: Frame, planned: Planned) -> None:
-        fbo = frame.targets(planned)
-        fbo.use()
-        fbo.scissor = None
-        fbo.viewport = (0, 0, *fbo.size)
-        fbo.clear(0.0, 0.0, 0.0, 0.0, depth=0.0)
-        frame.gl.ctx.enable_only(moderngl.DEPTH_TEST)
-        frame.gl.ctx.depth_func = ">"
-        frame.bind(planned)
-        frame.gpu.draw(
-            planned,
-            {"vertex": "surface/surface_vert.glsl", "fragment": "passes/subsurface_back_frag.glsl"},
-            CAMERA,
-            np.ascontiguousarray(frame.view["clip_from_world"]),
-            full=True,
-            only="subsurface",
-            units=len(planned.texture_reads()),
-            defines={
-                "SURFACE_TABLES": int(planned.has("brdf.albedo")), "SURFACE_SEE_THROUGH_GLASS": 1, "SURFACE_SEEN_BY_CAMERA": 1,
-                "SURFACE_SEEN_BY_SHADOW": 0,
-            },
-        )  # fmt: skip
-        frame.gl.ctx.depth_func = "<"
+        draw_for_camera(frame, planned, "passes/subsurface_back_frag.glsl", "subsurface", far=0.0)
 
 
 class Subsurface(ScreenPass):
@@ -67,14 +39,10 @@ class Subsurface(ScreenPass):
     reads = (
         "subsurface.back", "subsurface.back_normal", "gbuffer.depth", "gbuffer.normal", "gbuffer.diffuse",
         "gbuffer.subsurface", "gbuffer.entry",
-        Optional("direct.diffuse", ("subsurface.direct",)), Optional("indirect.diffuse", ("subsurface.indirect",)),
+        *SCATTERED,
         *(Optional(f"rsm.{name}") for name in ("depth", "normal", "albedo", "lights", "views")),
     )  # fmt: skip
-    writes = (
-        Texture("subsurface.direct", "subsurface_direct", "direct.diffuse after scattering below the surface; its share of "
-                "the surface's colour", "rgba32f", _screen),
-        Texture("subsurface.indirect", "subsurface_indirect", "the same of indirect.diffuse", "rgba32f", _screen),
-    )  # fmt: skip
+    writes = SUBSURFACE
     uniforms = (*MEDIUM_UNIFORMS, Uniform("rsm_light_count", "int", "lights with reflective shadow maps"))
     fragment = "passes/subsurface_frag.glsl"
 
@@ -82,7 +50,7 @@ class Subsurface(ScreenPass):
         return medium_defines(facts)
 
     def absent(self, facts: Facts) -> str | None:
-        return _off(facts)
+        return no_translucency(facts)
 
     def prepare(self, frame: Frame, planned: Planned, program) -> None:
         set_medium(frame, program, planned.facts)
