@@ -149,8 +149,9 @@ _AIR_SETTINGS = ("use_volumetric", "volume.density", "volume.anisotropy")
 
 # Quadratures of the sphere that are symmetric under the cube's 48 turns and mirrorings and have no direction within 5.6° of a
 # plane of the grid: (coordinates of one point, share of 4π) per orbit. Exact to degrees 7 and 9, by Newton's method on the
-# orbits' moments, the widest spaced of the solutions found. Directions along the grid, as in Lebedev's sets, carry the outline of a lit
-# patch across the room unblurred: on the empty Cornell box, 50 of Lebedev's have relMSE .082 and 48 of these .04 at 32³.
+# orbits' moments, the widest spaced of the solutions found. Directions along the grid, as in Lebedev's sets, carry the
+# outline of a lit patch across the room unblurred: on the empty Cornell box, 50 of Lebedev's have relMSE .082 and 48 of these
+# .04 at 32³.
 _ORBITS = {
     48: (((0.25478280537, 0.25478280537, 0.932829804507), 0.49655563),
          ((0.266270511079, 0.68157905445, 0.68157905445), 0.50344437)),
