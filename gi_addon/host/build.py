@@ -9,7 +9,7 @@ import numpy as np
 from mathutils import Matrix
 
 from ..scene import CAMERA, DIFFUSE, GLOSSY, SHADOW, TRANSMISSION, VOLUME, Camera, Link, Mesh, Scene, ShaderGraph
-from .compat import node_tree
+from .compat import SUBSURFACE_PATH, node_tree
 
 _NODES = {
     "BSDF_DIFFUSE": "ShaderNodeBsdfDiffuse", "BSDF_PRINCIPLED": "ShaderNodeBsdfPrincipled",
@@ -103,6 +103,9 @@ def _graph(tree: bpy.types.NodeTree, graph: ShaderGraph, output: str) -> None:
         sockets = {s.identifier: s for s in new.inputs}
         for key, value in node.inputs.items():
             socket = sockets[key]
+            if key in ("Subsurface Radius", "Radius") and isinstance(value, tuple):
+                # A radius that means the same free path in this Blender.
+                value = tuple(v * node.params.get("mean_free_path", 1.0) / SUBSURFACE_PATH for v in value)
             if isinstance(value, Link):
                 outputs = {s.identifier: s for s in made[value.node].outputs}
                 tree.links.new(outputs[value.output], socket)

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..materials import sky
 from ..scene import Image, Light, Link, Material, Node, ShaderGraph, World
-from .compat import uses_nodes
+from .compat import SUBSURFACE_PATH, uses_nodes
 
 _SRGB = ("sRGB", "sRGB - Texture", "Filmic sRGB", "AgX Base sRGB")
 _DATA = ("Non-Color", "Raw", "Generic Data", "Utility - Raw")
@@ -250,6 +250,8 @@ class GraphReader:
         params = {
             name: _plain(getattr(node, name)) for name in _PARAMS.get(node.type, ()) if hasattr(node, name)
         }
+        if node.type in ("BSDF_PRINCIPLED", "SUBSURFACE_SCATTERING") and SUBSURFACE_PATH != 1.0:
+            params["mean_free_path"] = SUBSURFACE_PATH
         if node.type in ("TEX_IMAGE", "TEX_ENVIRONMENT"):
             params["image"] = self.images.index(node.image, self.owner)
             if node.image is not None:

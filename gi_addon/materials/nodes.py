@@ -118,9 +118,8 @@ def principled(c: Compiler, n: Node) -> dict[str, Value]:
     subsurface = c.input(n, "Subsurface Weight", FLOAT, 0.0)
     if not subsurface.is_zero:
         r.subsurface = True
-        radius = c.input(n, "Subsurface Radius", VECTOR, (1.0, 0.2, 0.1))
-        scale = c.input(n, "Subsurface Scale", FLOAT, 0.05)
-        c.statement(f"principled_subsurface({out}, {base.text}, {subsurface.text}, {radius.text} * {scale.text}, "
+        path = _free_path(c, n, "Subsurface Radius", "Subsurface Scale")
+        c.statement(f"principled_subsurface({out}, {base.text}, {subsurface.text}, {path}, "
                     f"{roughness.text}, principled_ior({ior.text}, {level.text}));")  # fmt: skip
     coat = c.input(n, "Coat Weight", FLOAT, 0.0)
     emission = c.input(n, "Emission Color", COLOR, (1.0, 1.0, 1.0))
@@ -259,17 +258,23 @@ def translucent(c: Compiler, n: Node) -> dict[str, Value]:
     return {"BSDF": c.variable(CLOSURE, f"closure_translucent({color.text}, {_normal(c, n)})")}
 
 
+def _free_path(c: Compiler, n: Node, radius: str, scale: str) -> str:
+    """Mean free path below the surface, m: radius × scale, × what the Blender that the node is from makes of it."""
+    lengths = f"{c.input(n, radius, VECTOR, (1.0, 0.2, 0.1)).text} * {c.input(n, scale, FLOAT, 0.05).text}"
+    factor = n.params.get("mean_free_path")
+    return lengths if factor is None else f"{lengths} * {c.constant(factor, FLOAT).text}"
+
+
 @node("SUBSURFACE_SCATTERING")
 def subsurface_scattering(c: Compiler, n: Node) -> dict[str, Value]:
     """Diffuse that blurs over ``Radius`` × ``Scale``."""
     c.result.diffuse = c.result.subsurface = True
     color = c.input(n, "Color", COLOR, (0.8, 0.8, 0.8))
-    radius = c.input(n, "Radius", VECTOR, (1.0, 0.2, 0.1))
-    scale = c.input(n, "Scale", FLOAT, 0.05)
+    path = _free_path(c, n, "Radius", "Scale")
     roughness = c.input(n, "Roughness", FLOAT, 1.0)
     ior = c.input(n, "IOR", FLOAT, 1.4)
     closure = c.variable(CLOSURE, f"closure_diffuse({color.text}, {_normal(c, n)})")
-    c.statement(f"principled_subsurface({closure.text}, {color.text}, 1.0, {radius.text} * {scale.text}, "
+    c.statement(f"principled_subsurface({closure.text}, {color.text}, 1.0, {path}, "
                 f"{roughness.text}, {ior.text});")  # fmt: skip
     return {"BSSRDF": closure}
 
