@@ -86,7 +86,7 @@ def test_ordinates_integrate_the_sphere_and_are_symmetric(count):
     assert len(table) == count and share.sum() == pytest.approx(1.0, abs=1e-6)
     for value, expected in ((x**4, 1 / 5), (x * x * y * y, 1 / 15), (x**6, 1 / 7), (x * x * y * y * z * z, 1 / 105)):
         assert (share * value).sum() == pytest.approx(expected, abs=1e-6)
-    assert np.abs(w).min() > np.sin(np.radians(5.6))
+    assert np.abs(w).min() > np.sin(np.radians(7.0 if count <= 72 else 5.6))  # finer sets need not keep so far off
     known = {tuple(np.round(v, 5)) for v in w}
     for order in permutations(range(3)):
         for signs in product((-1, 1), repeat=3):

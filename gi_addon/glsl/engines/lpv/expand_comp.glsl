@@ -31,7 +31,7 @@ float order_4(ivec3 cell, vec3 w)
         float m2 = sqr(min(size / covered, 1.0));
         float x2 = sqr(dot(sum, w) / size);
         float legendre = ((35.0 * x2 - 30.0) * x2 + 3.0) / 8.0;
-        return -9.0 / (96.0 * PI) * legendre * (m2 * m2 * m2 * m2 * m2) / 0.28209479177;
+        return -9.0 / (96.0 * PI) * legendre * (m2 * m2 * m2 * m2 * m2) / 0.28209479177; // per Y of order 0, 1/(2√π)
     }
 #endif
     return 0.0;
