@@ -207,6 +207,10 @@ class SSDOSettings:
         0.25, "Thickness", "How thick what the screen shows is taken to be, as a share of its distance from the receiver",
         low=0.01, high=10.0, higher="fewer leaks behind things", lower="light passes behind thin things",
     )  # fmt: skip
+    layers: int = _setting(
+        1, "Layers", "How many surfaces behind each other are known at each pixel: those behind the first are not seen, but they "
+        "send light, and say how thick things are", low=1, high=3, higher="light from hidden surfaces", lower="faster",
+    )  # fmt: skip
     occlusion: str = _setting(
         "MITTRING", "Ambient Occlusion", "How the Ambient Occlusion pass is made",
         choices=(("BITMASK", "Visibility Bitmask", "Sectors of slices that samples fill"),

@@ -47,6 +47,9 @@ class GBuffer(Pass):
         Texture("gbuffer.z", "gbuf_z", "depth buffer", "depth24", _screen, scratch=True),
     )  # fmt: skip
 
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return {"LAYER": 1}
+
     def absent(self, facts: Facts) -> str | None:
         return None if facts.visible else "the camera has no surface to see"
 

@@ -38,6 +38,30 @@ void add_light(inout Gathered g, vec3 light, vec3 direction, float cos_n)
     g.direction += vec4(direction, 1.0) * (luminance(light) * PI / max(cos_n, LEAST_COS));
 }
 
+// The sectors in which a sample is the first to be seen; it fills them and those behind it.
+uint first_seen(inout uint mask, Covered r, float reach)
+{
+    uint seen = r.sectors & ~mask;
+    if (seen == 0u || r.distance > reach) {
+        return 0u;
+    }
+    uint lit = r.lit & ~mask;
+    mask |= seen;
+    return lit;
+}
+
+void add_sender(inout Gathered g, vec3 sent, uint lit, Covered r, Slice slice, vec3 n, vec3 v, vec3 t)
+{
+    vec3 direction = v * r.direction.x + t * r.direction.y;
+    add_light(g, sent * (float(bitCount(lit)) / SECTORS * slice.weight), direction, dot(direction, n));
+}
+
+#if LAYERS > 1
+// Nearness of where a surface's thing ends: at the next layer, if that shows its back there; at once, if this one does. Not known
+// (NOTHING) where the next layer is another thing's front.
+float thing_ends(vec4 here, vec4 next) { return here.w < 0.0 ? here.x : next.w < 0.0 ? next.x : NOTHING; }
+#endif
+
 Gathered gather_screen(vec3 position_ws, vec3 n, vec3 ng, vec3 v, ivec2 place)
 {
     Gathered g = Gathered(vec3(0.0), vec4(0.0));
@@ -57,20 +81,47 @@ Gathered gather_screen(vec3 position_ws, vec3 n, vec3 ng, vec3 v, ivec2 place)
         vec2 along = screen_direction(c, t);
         for (int turned = 0; turned < 2; ++turned) {
             vec2 side = along * (1.0 - 2.0 * float(turned));
-            Scan scan = begin_scan(origin, v, t, side * pixels_to_edge(origin.xy, side), ssdo_steps,
-                                   fract(u.x + 0.5 * float(turned)), ssdo_thickness);
+            vec2 way = side * pixels_to_edge(origin.xy, side);
+            float jitter = fract(u.x + 0.5 * float(turned));
+            Scan scan = begin_scan(ssdo_planes, origin, v, t, way, ssdo_steps, jitter, ssdo_thickness);
+#if LAYERS > 1
+            Scan scan_2 = begin_scan(ssdo_planes_2, origin, v, t, way, ssdo_steps, jitter, ssdo_thickness);
+#endif
+#if LAYERS > 2
+            Scan scan_3 = begin_scan(ssdo_planes_3, origin, v, t, way, ssdo_steps, jitter, ssdo_thickness);
+#endif
             for (int k = 0; k <= ssdo_steps; ++k) {
-                Covered r = scan_next(scan, slice, k);
-                uint seen = r.sectors & ~mask;
-                if (seen != 0u && r.distance <= reach) {
-                    uint lit = r.lit & ~mask;
-                    mask |= seen;
-                    if (lit != 0u && faces(r.at.plane, r.at.pixel, origin)) {
-                        vec3 direction = v * r.direction.x + t * r.direction.y;
-                        float share = float(bitCount(lit)) / SECTORS * slice.weight;
-                        add_light(g, sent_from(r.at.pixel) * share, direction, dot(direction, n));
-                    }
+                float end = NOTHING;
+                ivec2 at = scan.last.pixel;
+#if LAYERS > 1
+                vec4 below = texelFetch(ssdo_planes_2, at, 0);
+                end = thing_ends(scan.last.plane, below);
+#endif
+                Covered r = scan_next(ssdo_planes, scan, slice, k, end);
+                uint lit = first_seen(mask, r, reach);
+                if (lit != 0u && faces(r.at.plane, at, origin)) {
+                    add_sender(g, sent_from(at), lit, r, slice, n, v, t);
                 }
+#if LAYERS > 1
+                vec4 here = below;
+#if LAYERS > 2
+                below = texelFetch(ssdo_planes_3, at, 0);
+#else
+                below = vec4(0.0);
+#endif
+                r = scan_next(ssdo_planes_2, scan_2, slice, k, thing_ends(here, below));
+                lit = first_seen(mask, r, reach);
+                if (lit != 0u && faces(here, at, origin)) {
+                    add_sender(g, texelFetch(ssdo_sent_2, at, 0).rgb, lit, r, slice, n, v, t);
+                }
+#endif
+#if LAYERS > 2
+                r = scan_next(ssdo_planes_3, scan_3, slice, k, thing_ends(below, vec4(0.0)));
+                lit = first_seen(mask, r, reach);
+                if (lit != 0u && faces(below, at, origin)) {
+                    add_sender(g, texelFetch(ssdo_sent_3, at, 0).rgb, lit, r, slice, n, v, t);
+                }
+#endif
             }
         }
 #if GATHER_WORLD

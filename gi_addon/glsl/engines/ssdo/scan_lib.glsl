@@ -47,7 +47,7 @@ struct Scan {
     float since;      // share of the way from where `last` stands
 };
 
-Scan begin_scan(vec3 origin, vec3 v, vec3 t, vec2 way, int steps, float jitter, float thickness)
+Scan begin_scan(sampler2D planes, vec3 origin, vec3 v, vec3 t, vec2 way, int steps, float jitter, float thickness)
 {
     Scan scan;
     bool perspective = view.orthographic < 0.5;
@@ -63,7 +63,7 @@ Scan begin_scan(vec3 origin, vec3 v, vec3 t, vec2 way, int steps, float jitter, 
     scan.pixel = inversesqrt(max(dot(way, way), 1.0));
     scan.thickness = thickness;
     scan.last.pixel = ivec2(origin.xy);
-    scan.last.plane = texelFetch(ssdo_planes, scan.last.pixel, 0);
+    scan.last.plane = texelFetch(planes, scan.last.pixel, 0);
     scan.last.s = 0.0;
     scan.since = 0.0;
     return scan;
@@ -90,7 +90,7 @@ struct Covered {
 
 // What the pixel before the k-th sample's covers, which is known when that is another: k from 0 to `steps`, where the way ends.
 // All samples of one pixel are one. The receiver's own pixel covers nothing.
-Covered scan_next(inout Scan scan, Slice slice, int k)
+Covered scan_next(sampler2D planes, inout Scan scan, Slice slice, int k, float back)
 {
     ScreenSample a = scan.last;
     ScreenSample b = a;
@@ -103,7 +103,7 @@ Covered scan_next(inout Scan scan, Slice slice, int k)
             scan.last = b;
             return r;
         }
-        b.plane = texelFetch(ssdo_planes, b.pixel, 0);
+        b.plane = texelFetch(planes, b.pixel, 0);
         // A pixel is known at its middle: the edge may be before the sample of `a`, or a pixel behind that of `b`.
         float latest = b.s + scan.pixel;
         vec2 p = scan.origin.xy + scan.way * scan.since;
@@ -126,7 +126,9 @@ Covered scan_next(inout Scan scan, Slice slice, int k)
         int before = scan.since > 0.0 ? sectors_below(slice, unit(slice_toward(scan, a, scan.since)))
                                       : scan.across.y > 0.0 ? int(SECTORS) : 0;
         int after = sectors_below(slice, unit(slice_toward(scan, a, until)));
-        int behind = sectors_below(slice, unit(d - vec2(scan.thickness * far, 0.0)));
+        vec2 end = back > 0.5 * NOTHING ? vec2(scan.per_near * (back - scan.origin.z), 0.0) + scan.across * a.s
+                                        : d - vec2(scan.thickness * far, 0.0);
+        int behind = sectors_below(slice, unit(end));
         r.lit = bits_below(max(before, after)) & ~bits_below(min(before, after));
         r.sectors = r.lit | bits_below(max(after, behind)) & ~bits_below(min(after, behind));
     }
