@@ -292,6 +292,54 @@ def test_a_margin_brings_in_what_lies_just_outside(gl):
     assert with_margin == pytest.approx(reference, rel=0.1)
 
 
+def test_a_layer_behind_brings_in_what_something_hides(gl):
+    """A black card before the lit floor hides it from the camera, not from the wall above: with two layers the wall has the
+    floor's light by Lambert's polygon formula, 4 %; with one, what is hidden sends none."""
+    camera = scenes.perspective((0, -3.2, 0.6), (0, 0.3, 0.6), 0.9)
+    scene = corner(camera)
+    b = scenes.SceneBuilder()
+    b.quads(np.array([[[-1.5, -1.02, -0.2], [1.5, -1.02, -0.2], [1.5, -1.02, 0.3], [-1.5, -1.02, 0.3]]]), scenes.diffuse((0,) * 3))
+    b.quads(FLOOR[None], scenes.diffuse((0.8,) * 3))
+    b.quads(np.array([[[-1, 1, 0], [1, 1, 0], [1, 1, 1], [-1, 1, 1]]]), scenes.diffuse((0.8,) * 3))
+    b.light(scene.lights[0])
+    scene = b.build(camera)
+
+    def wall(layers):
+        image = ssdo(scene, "Diffuse Indirect", samples=8, gather_scale=1, ssdo__layers=layers).passes["Diffuse Indirect"][..., 0]
+        on, points = wall_points(camera, image.shape)
+        seen = points[:, 2] > 0.55  # above the card, as the camera sees it
+        expected = 0.8 * 5.0 / np.pi * polygon_irradiance(points, (0, -1, 0), FLOOR) / np.pi
+        return image[on][seen].sum() / expected[seen].sum()
+
+    one, two = wall(1), wall(2)
+    assert one < 0.5
+    assert two == pytest.approx(1.0, abs=0.04)
+
+
+def test_layers_know_how_thick_a_box_is(gl):
+    """With one layer the light around the boxes depends on how thick they are guessed to be; with two on nothing guessed."""
+    def light(layers, thickness):
+        return ssdo(scenes.cornell(), "Diffuse Indirect", samples=2, resolution=(64, 36), ssdo__layers=layers,
+                    ssdo__thickness=thickness).passes["Diffuse Indirect"]  # fmt: skip
+
+    apart = [np.abs(light(n, 0.02) - light(n, 1.0)).sum() / light(n, 0.02).sum() for n in (1, 2)]
+    assert apart[0] > 0.02 and apart[1] < 0.002, apart
+
+
+def test_one_layer_costs_nothing_of_the_others(gl):
+    """No pass and no texture of layers behind, nor with indirect light switched off."""
+    def titles(**values):
+        settings = Settings()
+        settings.set("technique", "SSDO")
+        for path, value in values.items():
+            settings.set(path.replace("__", "."), value)
+        return [p.title for p in inspect(scenes.cornell(), settings, resolution=(64, 36)).run]
+
+    assert not [t for t in titles(ssdo__layers=1) if "Layer" in t]
+    assert not [t for t in titles(ssdo__layers=3, use_indirect_diffuse=False) if "Layer" in t]
+    assert len([t for t in titles(ssdo__layers=3) if "Layer" in t]) == 6
+
+
 def test_a_margin_leaves_the_picture_where_it_was(gl):
     """Direct light and depth are the same with and without one, to the rounding of a longer projection."""
     scene = scenes.cornell()
@@ -392,7 +440,7 @@ def test_every_pass_is_finite_whatever_the_scene(gl, sources):
 OTHER = {
     "ssdo.samples": 64, "ssdo.steps": 4, "ssdo.radius": 0.2, "ssdo.thickness": 0.02,
     "ssdo.margin": 0.25, "ssdo.sources": "SCREEN", "ssdo.occlusion": "BITMASK", "ssdo.shadows": "SCREEN",
-    "ssdo.contact": 0.5, "ssdo.volumetric": "RADIAL",
+    "ssdo.contact": 0.5, "ssdo.volumetric": "RADIAL", "ssdo.layers": 2,
 }  # fmt: skip
 
 

@@ -38,28 +38,29 @@ void add_light(inout Gathered g, vec3 light, vec3 direction, float cos_n)
     g.direction += vec4(direction, 1.0) * (luminance(light) * PI / max(cos_n, LEAST_COS));
 }
 
-// The sectors in which a sample is the first to be seen; it fills them and those behind it.
-uint first_seen(inout uint mask, Covered r, float reach)
+// A sample's light, in the sectors in which it is the first to be seen; what it fills is added to `filled`, for after the samples
+// of all layers at this place: a thing is filled from its front to its back, which must not hide the back.
+void take(inout Gathered g, inout uint mask, inout uint filled, Covered r, float reach, bool sends, vec3 sent, Slice slice, vec3 n,
+          vec3 v, vec3 t)
 {
-    uint seen = r.sectors & ~mask;
-    if (seen == 0u || r.distance > reach) {
-        return 0u;
+    if (r.distance > reach) {
+        return;
     }
+    filled |= r.sectors;
     uint lit = r.lit & ~mask;
-    mask |= seen;
-    return lit;
+    if (lit != 0u && sends) {
+        mask |= lit;
+        vec3 direction = v * r.direction.x + t * r.direction.y;
+        add_light(g, sent * (float(bitCount(lit)) / SECTORS * slice.weight), direction, dot(direction, n));
+    }
 }
 
-void add_sender(inout Gathered g, vec3 sent, uint lit, Covered r, Slice slice, vec3 n, vec3 v, vec3 t)
-{
-    vec3 direction = v * r.direction.x + t * r.direction.y;
-    add_light(g, sent * (float(bitCount(lit)) / SECTORS * slice.weight), direction, dot(direction, n));
-}
-
+const vec4 NOT_KNOWN = vec4(NOTHING, 0.0, 0.0, 0.0);
 #if LAYERS > 1
-// Nearness of where a surface's thing ends: at the next layer, if that shows its back there; at once, if this one does. Not known
-// (NOTHING) where the next layer is another thing's front.
-float thing_ends(vec4 here, vec4 next) { return here.w < 0.0 ? here.x : next.w < 0.0 ? next.x : NOTHING; }
+// The plane in which a thing ends that begins at a surface: the next layer's, if that shows a back there; else it is a sheet.
+vec4 thing_ends(vec4 here, vec4 next) { return here.w > 0.0 && next.w < 0.0 ? next : here; }
+// The same for the last layer: a back ends what it belongs to, of a front it is not known.
+vec4 last_thing_ends(vec4 here) { return here.w < 0.0 ? here : NOT_KNOWN; }
 #endif
 
 Gathered gather_screen(vec3 position_ws, vec3 n, vec3 ng, vec3 v, ivec2 place)
@@ -91,37 +92,39 @@ Gathered gather_screen(vec3 position_ws, vec3 n, vec3 ng, vec3 v, ivec2 place)
             Scan scan_3 = begin_scan(ssdo_planes_3, origin, v, t, way, ssdo_steps, jitter, ssdo_thickness);
 #endif
             for (int k = 0; k <= ssdo_steps; ++k) {
-                float end = NOTHING;
                 ivec2 at = scan.last.pixel;
+                vec4 plane = scan.last.plane;
+                uint filled = 0u;
 #if LAYERS > 1
-                vec4 below = texelFetch(ssdo_planes_2, at, 0);
-                end = thing_ends(scan.last.plane, below);
+                vec4 behind = texelFetch(ssdo_planes_2, at, 0);
+                vec4 end = thing_ends(plane, behind);
+#else
+                vec4 end = NOT_KNOWN;
 #endif
                 Covered r = scan_next(ssdo_planes, scan, slice, k, end);
-                uint lit = first_seen(mask, r, reach);
-                if (lit != 0u && faces(r.at.plane, at, origin)) {
-                    add_sender(g, sent_from(at), lit, r, slice, n, v, t);
+                if (r.sectors != 0u) {
+                    take(g, mask, filled, r, reach, faces(plane, at, origin), sent_from(at), slice, n, v, t);
                 }
 #if LAYERS > 1
-                vec4 here = below;
+                plane = behind;
 #if LAYERS > 2
-                below = texelFetch(ssdo_planes_3, at, 0);
+                behind = texelFetch(ssdo_planes_3, at, 0);
+                end = thing_ends(plane, behind);
 #else
-                below = vec4(0.0);
+                end = last_thing_ends(plane);
 #endif
-                r = scan_next(ssdo_planes_2, scan_2, slice, k, thing_ends(here, below));
-                lit = first_seen(mask, r, reach);
-                if (lit != 0u && faces(here, at, origin)) {
-                    add_sender(g, texelFetch(ssdo_sent_2, at, 0).rgb, lit, r, slice, n, v, t);
+                r = scan_next(ssdo_planes_2, scan_2, slice, k, end);
+                if (r.sectors != 0u) {
+                    take(g, mask, filled, r, reach, faces(plane, at, origin), texelFetch(ssdo_sent_2, at, 0).rgb, slice, n, v, t);
                 }
 #endif
 #if LAYERS > 2
-                r = scan_next(ssdo_planes_3, scan_3, slice, k, thing_ends(below, vec4(0.0)));
-                lit = first_seen(mask, r, reach);
-                if (lit != 0u && faces(below, at, origin)) {
-                    add_sender(g, texelFetch(ssdo_sent_3, at, 0).rgb, lit, r, slice, n, v, t);
+                r = scan_next(ssdo_planes_3, scan_3, slice, k, last_thing_ends(behind));
+                if (r.sectors != 0u) {
+                    take(g, mask, filled, r, reach, faces(behind, at, origin), texelFetch(ssdo_sent_3, at, 0).rgb, slice, n, v, t);
                 }
 #endif
+                mask |= filled;
             }
         }
 #if GATHER_WORLD

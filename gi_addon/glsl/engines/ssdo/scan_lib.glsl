@@ -89,8 +89,9 @@ struct Covered {
 };
 
 // What the pixel before the k-th sample's covers, which is known when that is another: k from 0 to `steps`, where the way ends.
-// All samples of one pixel are one. The receiver's own pixel covers nothing.
-Covered scan_next(sampler2D planes, inout Scan scan, Slice slice, int k, float back)
+// All samples of one pixel are one. The receiver's own pixel covers nothing. `end` is the plane where the thing ends that the sample
+// shows; NOTHING where that is not known, and guessed.
+Covered scan_next(sampler2D planes, inout Scan scan, Slice slice, int k, vec4 end)
 {
     ScreenSample a = scan.last;
     ScreenSample b = a;
@@ -126,9 +127,11 @@ Covered scan_next(sampler2D planes, inout Scan scan, Slice slice, int k, float b
         int before = scan.since > 0.0 ? sectors_below(slice, unit(slice_toward(scan, a, scan.since)))
                                       : scan.across.y > 0.0 ? int(SECTORS) : 0;
         int after = sectors_below(slice, unit(slice_toward(scan, a, until)));
-        vec2 end = back > 0.5 * NOTHING ? vec2(scan.per_near * (back - scan.origin.z), 0.0) + scan.across * a.s
-                                        : d - vec2(scan.thickness * far, 0.0);
-        int behind = sectors_below(slice, unit(end));
+        vec2 past = d - vec2(scan.thickness * far, 0.0);
+        if (end.x > 0.5 * NOTHING) {
+            past = slice_toward(scan, ScreenSample(a.pixel, end, a.s), a.s);
+        }
+        int behind = sectors_below(slice, unit(past));
         r.lit = bits_below(max(before, after)) & ~bits_below(min(before, after));
         r.sectors = r.lit | bits_below(max(after, behind)) & ~bits_below(min(after, behind));
     }
