@@ -208,7 +208,7 @@ class SSDOSettings:
         low=0.01, high=10.0, higher="fewer leaks behind things", lower="light passes behind thin things",
     )  # fmt: skip
     layers: int = _setting(
-        1, "Layers", "How many surfaces behind each other are known at each pixel: those behind the first are not seen, but they "
+        2, "Layers", "How many surfaces behind each other are known at each pixel: those behind the first are not seen, but they "
         "send light, and say how thick things are", low=1, high=3, higher="light from hidden surfaces", lower="faster",
     )  # fmt: skip
     occlusion: str = _setting(
@@ -233,7 +233,7 @@ class SSDOSettings:
                   "light must be in the picture")),
     )  # fmt: skip
     margin: float = _setting(
-        0.0, "Margin", "How much is drawn beyond each side of the picture, as a share of its longer side: what lies there "
+        0.25, "Margin", "How much is drawn beyond each side of the picture, as a share of its longer side: what lies there "
         "still counts", low=0.0, high=1.0, higher="light from just outside", lower="faster",
     )  # fmt: skip
     sources: str = _setting(

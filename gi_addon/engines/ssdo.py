@@ -54,7 +54,7 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         last = bounce == settings.bounces
         bounces += [
             SentLight(bounce),
-            InterpolatedIndirect(f"ssdo.sent.{bounce}", f"ssdo.low.{bounce}", layers_behind),
+            InterpolatedIndirect(f"ssdo.sent.{bounce}", f"ssdo.low.{bounce}", layers_behind, last=last),
             _smoothing(f"ssdo.sent.{bounce}", f"ssdo.low.{bounce}"),
             IndirectLighting(f"ssdo.sent.{bounce}", f"ssdo.low.{bounce}",
                              "indirect.diffuse" if last else f"ssdo.bounce.{bounce}", layers_behind),
@@ -210,6 +210,7 @@ class _Gather(ScreenPass):
     )
     sent = ""
     layers = 1  # of depth that light comes from
+    last = False  # bounce: what it lights sends no further
 
     def behind(self, layers: Iterable[int]) -> tuple[str, ...]:
         """What it reads of the layers behind."""
@@ -235,6 +236,7 @@ class _Gather(ScreenPass):
             "GATHER_WORLD": int(self.from_sources and not facts.world_black),
             "GATHER_SCALE": facts.settings.gather_scale,
             "LAYERS": self.layers,
+            "MARGIN_RECEIVES": int(not self.last or _shaded_screen_wanted(facts)),
         }
 
     def run(self, frame: Frame, planned: Planned) -> None:
@@ -257,8 +259,8 @@ class InterpolatedIndirect(_Gather):
     figure = "SSDO Interpolated Indirect Lighting Computation"
     fragment = "engines/ssdo/gather_low_frag.glsl"
 
-    def __init__(self, sent: str, low: str, layers_behind: Sequence[int] = ()) -> None:
-        self.sent = sent
+    def __init__(self, sent: str, low: str, layers_behind: Sequence[int] = (), *, last: bool = False) -> None:
+        self.sent, self.last = sent, last
         self.title = f"{_title(sent)} (low resolution)"
         self.reads = ("ssdo.planes", _read(sent), "gbuffer.low_depth", "gbuffer.low_normal", "gbuffer.low_pixel",
                       *self.behind(layers_behind))  # fmt: skip
@@ -280,11 +282,19 @@ class IndirectLighting(_Gather):
             Optional("gbuffer.low_normal"), Optional("gbuffer.low_pixel"), Optional(low), Optional(f"{low}.direction"),
             *self.behind(layers_behind),
         )  # fmt: skip
+        self.last = self.target == "INDIRECT"
         glsl = {"INDIRECT": "indirect_diffuse", "SCREEN_LIGHT": "screen_light", "BOUNCE": "last_bounce"}[self.target]
         self.writes = (Texture(target, glsl, LIGHT, "rgba32f", _screen),)
 
     def defines(self, facts: Facts) -> dict[str, int]:
         return {**super().defines(facts), **_TARGET, "TARGET": _TARGET[f"TARGET_{self.target}"]}
+
+
+def _shaded_screen_wanted(facts: Facts) -> bool:
+    """Whether something looks at the screen's own light: mirrors, glass and what scatters below its surface."""
+    if no_gloss(facts) is None:
+        return True
+    return no_translucency(facts) is None and (facts.transmissive or facts.subsurface)
 
 
 def _title(sent: str) -> str:

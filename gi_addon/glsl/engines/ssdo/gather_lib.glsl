@@ -23,6 +23,18 @@ vec3 sent_from(ivec2 pixel)
 #endif
 }
 
+// Whether light is wanted at a pixel: what is drawn beyond the picture (by more than `beyond` pixels) only sends.
+bool receives(ivec2 pixel, int beyond)
+{
+#if MARGIN_RECEIVES
+    return true;
+#else
+    ivec2 low = ivec2(view.margin - beyond);
+    ivec2 high = ivec2(view.resolution) - low;
+    return all(greaterThanEqual(pixel, low)) && all(lessThan(pixel, high));
+#endif
+}
+
 struct Gathered {
     vec3 radiance;    // E/π, W/(m²·sr)
     vec4 direction;   // Σ luminance × direction; Σ luminance
