@@ -45,7 +45,7 @@ PRESETS: dict[str, Preset] = {
          "rsm.resolution": 256, "rsm.samples": 64, "lpv.resolution": 16, "vct.resolution": 32,
          "vct.cones": 12, "ssdo.samples": 64},
     ),
-    # Against a Cycles that bounces on, later bounces are worth more than anything else, and in the grids they cost next to nothing
+    # Against a Cycles that bounces on, later bounces are worth more than all else, and in grids they cost next to nothing
     # while the light stands still. Sub-frames average every other noise, so each takes fewer virtual lights the more there are.
     "BALANCED": Preset(
         "Balanced", "About the time of Cycles with one denoised sample: four sub-frames, three bounces",
