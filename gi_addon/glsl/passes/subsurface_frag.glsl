@@ -176,6 +176,7 @@ void main()
             vec3 before = vec3(0.0);
             bool walking = path > 0.0 && dot(direction, ng) < 0.0;
             bool left = false;
+            int turns = 0;
             if (path <= 0.0) {
                 // No medium in this channel: light leaves where it enters.
                 left = true;
@@ -191,6 +192,7 @@ void main()
                         left = true;
                     } else {
                         weight *= alpha;
+                        ++turns;
                         if (inside > DEEP * path && inside < FAR) {
                             float radius = EMPTY * inside;
                             offset += draw_direction(state) * radius;
@@ -224,6 +226,11 @@ void main()
                 }
 #endif
                 weight /= surface_albedo * float(WALKS);
+                // A sheet without thickness has no inside: the light's map shows its other side where the walk starts, and
+                // nothing else says that the object ends there. Cycles' walk goes on from it into the void.
+                if (turns == 0 && path > 0.0 && beyond.lit < 0.0 && beyond.far >= 0.0 && length(before) < doubt) {
+                    weight = vec3(0.0);
+                }
                 if (at.pixel.x >= 0 && (beyond.near < 0.0 || (at.near <= min(doubt, at.far) && beyond.far >= 0.0))) {
 #if HAS_DIRECT_DIFFUSE
                     direct += weight * texelFetch(direct_diffuse, at.pixel, 0).rgb;
