@@ -97,9 +97,12 @@ def test_many_coloured_panes_tint_as_in_cycles_at_few_subframes(blender, gl):
 
 
 def test_a_sheet_that_scatters_below_is_no_brighter_for_a_lamp_behind_it(blender, gl):
-    """A walk that enters a sheet without thickness finds no other side, as in Cycles: nothing of a lamp behind it shows."""
+    """A walk that enters a sheet without thickness finds no other side, as in Cycles. (Where the map of the lamp behind showed one,
+    walks left at once, as bright as the lamp in front makes the sheet, over its albedo.)"""
     bpy = blender
-    scene = put(bpy, scenes.plane_scene(scenes.sun_light((0.0, -1.0, -0.4), 3.0)), size=SIZE, samples=16)
+    plain = scenes.plane_scene(scenes.sun_light((0.0, -1.0, -0.4), 3.0))
+    plain.lights.append(scenes.sun_light((0.2, 1.0, -0.4), 2.0))
+    scene = put(bpy, plain, size=SIZE, samples=16)
 
     def connect(tree, output):
         leaf = tree.nodes.new("ShaderNodeBsdfPrincipled")
@@ -114,7 +117,7 @@ def test_a_sheet_that_scatters_below_is_no_brighter_for_a_lamp_behind_it(blender
     leaf = reference["Diffuse Color"][..., 2] < 0.3
     assert leaf.sum() > 50, "nothing was tested"
     light, theirs = (p["Diffuse Direct"][..., :3][leaf].mean(axis=0) for p in (test, reference))
-    assert np.allclose(light, theirs, atol=0.05), (light, theirs)
+    assert np.allclose(light, theirs, rtol=0.1), (light, theirs)
 
 
 def test_ray_visibility_holdout_and_indirect_only(blender, gl):
