@@ -97,8 +97,8 @@ def test_many_coloured_panes_tint_as_in_cycles_at_few_subframes(blender, gl):
 
 
 def test_a_sheet_that_scatters_below_is_no_brighter_for_a_lamp_behind_it(blender, gl):
-    """A walk that enters a sheet without thickness finds no other side, as in Cycles. (Where the map of the lamp behind showed one,
-    walks left at once, as bright as the lamp in front makes the sheet, over its albedo.)"""
+    """A walk that enters a sheet without thickness finds no other side, as in Cycles. (Where the map of the lamp behind showed
+    one, walks left at once, as bright as the lamp in front makes the sheet, over its albedo.)"""
     bpy = blender
     plain = scenes.plane_scene(scenes.sun_light((0.0, -1.0, -0.4), 3.0))
     plain.lights.append(scenes.sun_light((0.2, 1.0, -0.4), 2.0))
