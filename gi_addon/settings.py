@@ -209,8 +209,8 @@ class SSDOSettings:
         soft_high=100.0, unit="m", higher="light from farther away", lower="finer near by, dark rooms",
     )  # fmt: skip
     thickness: float = _setting(
-        0.25, "Thickness", "How thick what the screen shows is taken to be where no layer behind tells, as a share of its distance from the "
-        "receiver",
+        0.25, "Thickness", "How thick what the screen shows is taken to be where no layer behind tells, as a share of its "
+        "distance from the receiver",
         low=0.01, high=10.0, higher="fewer leaks behind things", lower="light passes behind thin things",
     )  # fmt: skip
     layers: int = _setting(
