@@ -18,7 +18,7 @@ from ..facts import Facts
 from ..frame import Frame
 from ..gpu_scene import world_source
 from ..gpu_types import LIGHT_SUN, LIGHT_WORLD
-from ..graph import Optional, Pass, Planned, Texture, Uniform
+from ..graph import Optional, Pass, Planned, Texture, Uniform, glsl_name
 from ..passes.ao import AOBlur, AOGeneration
 from ..passes.brdf_tables import BRDFTables
 from ..passes.direct_lighting import DirectLighting, TranslucentLighting
@@ -144,7 +144,7 @@ class Layer(GBuffer):
         self.layer = layer
         self.title = f"SSDO Layer {layer}"
         self.reads = (*GBuffer.reads, _planes(layer - 1))
-        kept = ("depth", "normal", "diffuse", "specular", "lobe", "z")
+        kept = ("depth", "normal", "diffuse", "specular", "lobe", "set", "z")
         self.writes = tuple(
             replace(w, name=_of_layer(w.name, layer)) for w in GBuffer.writes if w.name.removeprefix("gbuffer.") in kept
         )
@@ -164,15 +164,19 @@ def _present(task: Pass) -> set[str]:
 class LayerLighting(DirectLighting):
     """Direct light on a layer that the camera does not see."""
 
+    kept = ("lights", Optional("lights.views"), Optional("shadow.depth"), Optional("rsm.depth"))
+
     def __init__(self, layer: int) -> None:
         self.title = f"SSDO Layer {layer} Direct Lighting"
-        self.reads = ("lights", Optional("lights.views"), Optional("shadow.depth"), Optional("rsm.depth"),
-                      _of_layer("gbuffer.depth", layer), _of_layer("gbuffer.normal", layer))  # fmt: skip
+        self.reads = (*self.kept, *(_of_layer(name, layer) for name in ("gbuffer.depth", "gbuffer.normal")),
+                      Optional(_of_layer("gbuffer.set", layer)))  # fmt: skip
         self.writes = (replace(DirectLighting.writes[0], name=_of_layer("direct.diffuse", layer)),)
 
     def defines(self, facts: Facts) -> dict[str, int]:
-        named = {f"HAS_{n}": 0 for n in ("DIRECT_GLOSSY", "DIRECT_SHADOW", "SHADOW_CONES", "WORLD_DIFFERENCE", "SCREEN_LIGHT")}
-        return {**super().defines(facts), **named}
+        told = {*self.kept, Optional("gbuffer.set")}
+        others = [r.name for r in DirectLighting.reads if isinstance(r, Optional) and r not in told]
+        others += [w.name for w in DirectLighting.writes[1:]]
+        return {**super().defines(facts), **{f"HAS_{glsl_name(name).upper()}": 0 for name in others}}
 
 
 class SentLight(ScreenPass):
