@@ -203,6 +203,22 @@ class SentLight(ScreenPass):
         return _no_bounce(facts)
 
 
+_BOX = Uniform("ssdo_box", "vec4", "the rectangle of the screen that the scene's box covers: low x, y, high x, y, pixels")
+
+
+def _screen_box(frame: Frame, facts: Facts) -> tuple[float, float, float, float]:
+    """``ssdo_box`` of this sub-frame: with a pixel around for rounding, within what is drawn; all that where the eye is in it."""
+    width, height = facts.resolution
+    corners = np.array([[(low, high)[k >> axis & 1] for axis, (low, high) in enumerate(zip(*facts.rig.bounds, strict=True))]
+                        for k in range(8)])  # fmt: skip
+    clip = np.c_[corners, np.ones(8)] @ frame.view["clip_from_world"].astype("f8")  # stored by columns
+    if (clip[:, 3] <= 1e-6 * facts.radius).any():
+        return (0.0, 0.0, float(width), float(height))
+    at = (clip[:, :2] / clip[:, 3:] * 0.5 + 0.5) * (width, height)
+    low, high = np.clip([at.min(axis=0) - 1.0, at.max(axis=0) + 1.0], 0.0, (width, height))
+    return (*low.tolist(), *high.tolist())
+
+
 class _Gather(ScreenPass):
     """Light from the screen: ``sent`` is the radiance that pixels send, or their emission, which comes with the world's light."""
 
@@ -211,6 +227,7 @@ class _Gather(ScreenPass):
         Uniform("ssdo_steps", "int", "depth tests along each of a slice's two sides"),
         Uniform("ssdo_radius", "float", "how far light is gathered from, world units; 0 = everywhere"),
         Uniform("ssdo_thickness", "float", "thickness of what the screen shows, as a share of its distance from the receiver"),
+        _BOX,
     )
     sent = ""
     layers = 1  # of depth that light comes from
@@ -253,6 +270,7 @@ class _Gather(ScreenPass):
                 ssdo_steps=settings.steps,
                 ssdo_radius=settings.radius,
                 ssdo_thickness=settings.thickness,
+                ssdo_box=_screen_box(frame, planned.facts),
             )
             frame.screen(planned, program)
 
@@ -328,6 +346,7 @@ class AOScan(ScreenPass):
         Uniform("ao_steps", "int", "depth tests along each of a slice's two sides"),
         Uniform("ao_distance", "float", "how far an occluder counts, m"),
         Uniform("ao_thickness", "float", "thickness of what the screen shows, as a share of its distance from the receiver"),
+        _BOX,
     )
     fragment = "engines/ssdo/ao_scan_frag.glsl"
 
@@ -342,6 +361,7 @@ class AOScan(ScreenPass):
             ao_steps=facts.settings.ao.steps,
             ao_distance=min(facts.ao_distance, 2.0 * facts.radius),
             ao_thickness=facts.settings.ssdo.thickness,
+            ssdo_box=_screen_box(frame, facts),
         )
 
 

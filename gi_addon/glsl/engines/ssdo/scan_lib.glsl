@@ -1,4 +1,5 @@
-// The screen's samples of a slice (slice_lib.glsl), one side of it at a time. Included where `ssdo_planes` is declared.
+// The screen's samples of a slice (slice_lib.glsl), one side of it at a time. Included where `ssdo_planes` and `ssdo_box`
+// are declared.
 //
 // A sample stands for its surface as far as that goes: to where it meets the plane of the next sample, if that is between the
 // two, and half-way else; and for as much behind it as it is taken to be thick. The paper leaves the gaps between samples
@@ -12,11 +13,11 @@
 #include "engines/ssdo/screen_lib.glsl"
 #include "engines/ssdo/slice_lib.glsl"
 
-// Pixels from `from` to the picture's edge along a unit direction.
+// Pixels from `from`, along a unit direction, to the edge of what is drawn, or of the scene on it: no step is spent on nothing.
 float pixels_to_edge(vec2 from, vec2 along)
 {
-    vec2 room = mix(from, view.resolution - from, greaterThan(along, vec2(0.0)));
-    vec2 d = room / max(abs(along), vec2(1e-6));
+    vec2 room = mix(from - ssdo_box.xy, ssdo_box.zw - from, greaterThan(along, vec2(0.0)));
+    vec2 d = max(room, 0.0) / max(abs(along), vec2(1e-6));
     return 0.999 * min(d.x, d.y);
 }
 
