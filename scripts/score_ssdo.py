@@ -105,7 +105,8 @@ def main() -> None:
                 for seed in (1, 2):
                     made = build.build(scene)
                     made.render.resolution_x, made.render.resolution_y, made.render.resolution_percentage = *SIZE, 100
-                    cycles.set_up(made, cycles.Reference(1, arguments.reference_samples, seed))
+                    # A mirror shows light that has bounced once already.
+                    cycles.set_up(made, cycles.Reference(2 if table == "mirrors" else 1, arguments.reference_samples, seed))
                     if table == "mirrors":
                         made.cycles.caustics_reflective = False  # which only add noise to it
                     halves.append(cycles.render_passes(made, (wanted,))[wanted][..., :3])
