@@ -49,7 +49,8 @@ def mirror_room(roughness: float):
     b.quads(np.array([[[-1.5, 1.5, 0], [1.5, 1.5, 0], [1.5, 1.5, 1.5], [-1.5, 1.5, 1.5]]]), scenes.diffuse((0.7, 0.7, 0.6)))
     b.quads(scenes.box_quads((-0.8, 0.3, 0.0), (-0.3, 0.8, 0.7)), scenes.diffuse((0.8, 0.2, 0.1)))
     b.quads(scenes.box_quads((0.2, 0.5, 0.0), (0.8, 1.0, 0.4)), scenes.diffuse((0.1, 0.3, 0.8)))
-    b.light(scenes.sun_light((0.3, 1.0, -0.9), 4.0))
+    # Along the floor, which would else throw it on as if it were diffuse.
+    b.light(scenes.sun_light((0.25, 1.0, 0.0), 4.0))
     return b.build(scenes.perspective((0, -3.4, 1.3), (0, 0.4, 0.35), 0.75))
 
 
