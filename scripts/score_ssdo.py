@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """SSDO on scenes made by code against one bounce of Cycles: the numbers of docs/techniques/ssdo.md.
 
-``.venv/bin/python scripts/score_ssdo.py indirect mirrors occlusion translucency`` prints a table each; ``-o FOLDER`` writes sheets.
+``.venv/bin/python scripts/score_ssdo.py indirect mirrors occlusion translucency`` prints tables; ``-o FOLDER`` writes sheets.
 """
 
 from __future__ import annotations
