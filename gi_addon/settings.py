@@ -273,6 +273,9 @@ class Settings:
     technique: str = _setting("RSM", "Technique", "How light bounces", choices=TECHNIQUES)
     use_indirect_diffuse: bool = _setting(True, "Indirect Diffuse", "Light that bounced off surfaces onto surfaces")
     use_glossy: bool = _setting(True, "Glossy Reflections", "What glossy surfaces mirror")
+    share_reflections: bool = _setting(
+        True, "Share Reflections", "Pixels of one surface share what their reflected rays found; rough reflections need it"
+    )
     use_shadows: bool = _setting(True, "Shadows", "Lights are blocked by objects")
     use_ao: bool = _setting(True, "Ambient Occlusion", "Near surfaces block light that nothing else tests")
     use_translucency: bool = _setting(True, "Translucency", "Light through and inside objects")

@@ -24,10 +24,10 @@ from ..passes.direct_lighting import DirectLighting, TranslucentLighting
 from ..passes.gbuffer import GBuffer, TranslucentBack, TranslucentLayer, TranslucentTint
 from ..passes.lights import LightList, RSMGeneration, ShadowMaps
 from ..passes.occupancy import CELL_UNIFORMS, Occupancy, set_cells
+from ..passes.reflections import GLOSSY_TRACED, reflection_sharing
 from ..passes.resolve import Resolve
 from ..passes.screen import (
     INDIRECT_DIFFUSE,
-    INDIRECT_GLOSSY,
     LOBE,
     REFRACTING,
     TRANSMISSION_INDIRECT,
@@ -85,6 +85,7 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         Subsurface(),
         TranslucentLighting(),
         GlossyLighting(),
+        *reflection_sharing(settings),
         Refraction(),
         Volumetric(),
         Resolve(layers),
@@ -575,7 +576,7 @@ class GlossyLighting(ScreenPass):
     figure = "LPV Lighting Computation"
     source = _RAY_SOURCE
     reads = (*_RAY_READS, *LOBE)
-    writes = (INDIRECT_GLOSSY,)
+    writes = (GLOSSY_TRACED,)
     uniforms = (*_RAY_UNIFORMS, Uniform("glossy_rays", "int", "rays per pixel"))
     fragment = "engines/lpv/glossy_frag.glsl"
 
