@@ -180,10 +180,6 @@ class LPVSettings:
                  ("48", "48", "Fastest"), ("72", "72", "For 32 cells"), ("144", "144", "For 64 cells"),
                  ("288", "288", "For 128 cells")),
     )  # fmt: skip
-    glossy_rays: int = _setting(
-        2, "Glossy Rays", "Rays through the grid per pixel and sub-frame for glossy reflections", low=1, high=64,
-        higher="less noise on rough surfaces", lower="faster",
-    )  # fmt: skip
     occlusion: bool = _setting(True, "Occlusion", "Objects stop light on its way through the grid")
 
 

@@ -18,7 +18,7 @@ from ..passes.direct_lighting import DirectLighting, TranslucentLighting
 from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint, gather_size
 from ..passes.lights import LightList, RSMGeneration, ShadowMaps
 from ..passes.occupancy import CELL_UNIFORMS, Occupancy, set_cells
-from ..passes.reflections import GLOSSY_TRACED, reflection_sharing
+from ..passes.reflections import GLOSSY_RAY, GLOSSY_TRACED, reflection_sharing
 from ..passes.resolve import Resolve
 from ..passes.screen import (
     INDIRECT_DIFFUSE,
@@ -309,7 +309,7 @@ class GlossyReflections(ScreenPass):
     title = "RSM Glossy Reflections"
     figure = "Ray Casting in RSM"
     reads = (*_RAY_READS, *LOBE)
-    writes = (GLOSSY_TRACED,)
+    writes = (GLOSSY_TRACED, GLOSSY_RAY)
     uniforms = _RAY_UNIFORMS
     fragment = "engines/rsm/glossy_frag.glsl"
 

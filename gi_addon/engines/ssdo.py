@@ -25,7 +25,7 @@ from ..passes.direct_lighting import DirectLighting, TranslucentLighting
 from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint
 from ..passes.lights import LightList, ShadowMaps
 from ..passes.occupancy import Occupancy
-from ..passes.reflections import GLOSSY_TRACED, reflection_sharing
+from ..passes.reflections import GLOSSY_RAY, GLOSSY_TRACED, reflection_sharing
 from ..passes.resolve import Resolve
 from ..passes.screen import (
     LIGHT,
@@ -305,8 +305,8 @@ SOURCES_TRACED = replace(
     GLOSSY_TRACED, name="sources.traced", glsl="traced_sources",
     when=lambda f: None if _sources_traced(f) else "the world and emissive surfaces shine through shadow maps",
 )  # fmt: skip
-REFLECTED_SOURCES = Texture("reflected.sources", "reflected_sources", "radiance that the glossy lobe reflects of the world and of "
-                            "emissive pixels, W/(m²·sr)", "rgba32f", _screen)  # fmt: skip
+REFLECTED_SOURCES = Texture("reflected.sources", "reflected_sources", "radiance that the glossy lobe reflects of the world and "
+                            "of emissive pixels, W/(m²·sr)", "rgba32f", _screen)  # fmt: skip
 
 
 class Reflections(Pass):
@@ -318,8 +318,7 @@ class Reflections(Pass):
         Optional("gbuffer.emission", ("sources.traced",)),
     )  # fmt: skip
     writes = (
-        GLOSSY_TRACED,
-        SOURCES_TRACED,
+        GLOSSY_TRACED, SOURCES_TRACED, GLOSSY_RAY,
     )  # fmt: skip
     uniforms = (
         Uniform("ssdo_thickness", "float", "thickness of what the screen shows, as a share of its distance from the receiver"),

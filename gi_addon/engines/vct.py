@@ -16,7 +16,7 @@ from ..passes.direct_lighting import DirectLighting, TranslucentLighting
 from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint
 from ..passes.lights import LightList, RSMGeneration, ShadowMaps
 from ..passes.occupancy import Occupancy
-from ..passes.reflections import GLOSSY_TRACED, reflection_sharing
+from ..passes.reflections import GLOSSY_RAY, GLOSSY_TRACED, reflection_sharing
 from ..passes.resolve import Resolve
 from ..passes.screen import (
     INDIRECT_DIFFUSE,
@@ -254,7 +254,7 @@ class GlossyCones(ScreenPass):
     title = "Voxel Glossy Reflections"
     figure = "Voxel Lighting Computation"
     reads = (*_VOLUMES, "voxels.albedo", "gbuffer.depth", "gbuffer.normal", *LOBE)
-    writes = (GLOSSY_TRACED,)
+    writes = (GLOSSY_TRACED, GLOSSY_RAY)
     uniforms = _CONE_UNIFORMS
     fragment = "engines/vct/glossy_frag.glsl"
 

@@ -8,10 +8,12 @@ from ..graph import Texture
 from ..settings import Settings
 from .screen import INDIRECT_GLOSSY, LOBE, ScreenPass, _screen
 
-_FOUND = ("radiance that rays of the lobe found, each by its share of the lobe's albedo, W/(m²·sr); 1/distance of what is "
-          "mirrored, 1/m, -1 where no lobe is")  # fmt: skip
+_NEARNESS = "1/distance of what is mirrored, 1/m, -1 where no lobe is"
 # What a pass of reflected rays writes (lib/reflection_lib.glsl).
-GLOSSY_TRACED = Texture("glossy.traced", "traced", _FOUND, "rgba32f", _screen)
+GLOSSY_TRACED = Texture("glossy.traced", "traced", f"radiance along the pixel's reflected ray, W/(m²·sr); {_NEARNESS}", "rgba32f",
+                        _screen)  # fmt: skip
+GLOSSY_RAY = Texture("glossy.ray", "traced_ray", "the ray's direction, world space; its density, 1/sr, 0 where it points below "
+                     "the surface", "rgba32f", _screen)  # fmt: skip
 # What of it is shared.
 _SHARED = {"SHARED_GLOSSY": 0, "SHARED_SOURCES": 1}
 
@@ -24,7 +26,8 @@ class ReflectionSharing(ScreenPass):
     def __init__(self, source: str, target: Texture, number: int, kind: str) -> None:
         self.title = f"Reflection Sharing of {target.name}"
         self.number, self.kind = number, kind
-        self.reads = (source, "gbuffer.depth", "gbuffer.normal", *LOBE)
+        rays = (GLOSSY_RAY.name,) if number < 2 else ()
+        self.reads = (source, *rays, "gbuffer.depth", "gbuffer.normal", *LOBE)
         self.writes = (target,)
 
     def defines(self, facts: Facts) -> dict[str, int]:
@@ -37,5 +40,6 @@ def reflection_sharing(
     """The passes that make ``target`` of what rays found, ``traced``."""
     if not settings.share_reflections:
         return [ReflectionSharing(traced.name, target, 0, kind)]
-    near = Texture(f"{traced.name}.near", "traced_near", _FOUND, "rgba32f", _screen)
+    mean = f"mean radiance over the lobe, W/(m²·sr); {_NEARNESS}"
+    near = Texture(f"{traced.name}.near", "traced_near", mean, "rgba32f", _screen)
     return [ReflectionSharing(traced.name, near, 1, kind), ReflectionSharing(near.name, target, 2, kind)]

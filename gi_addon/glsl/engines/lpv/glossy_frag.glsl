@@ -18,25 +18,23 @@ void main()
     ivec2 pixel = ivec2(gl_FragCoord.xy);
     float depth = texelFetch(gbuf_depth, pixel, 0).r;
     traced = NO_LOBE;
+    traced_ray = vec4(0.0);
     Lobe lobe = lobe_unpack(texelFetch(gbuf_specular, pixel, 0), texelFetch(gbuf_lobe, pixel, 0));
     if (depth <= 0.0 || !lobe_reflects(lobe)) {
         return;
     }
     // Each pixel turns the sequence by its own number (R. Cranley and T. Patterson, 1976).
-    vec2 turn = unit_shift(hash_u32(uvec2(pixel + view.pixel_offset)));
-    vec4 sum = NO_LIGHT;
-    for (int i = 0; i < glossy_rays; ++i) {
-        vec2 u = fract(sobol_2d(view.subframe * uint(glossy_rays) + uint(i), 40u) + turn);
-        ReflectedRay ray = reflected_ray(lobe, pixel, depth, u);
-        if (ray.passes) {
-            bool hit;
-            float distance;
-            vec3 radiance = rsm_ray(ray.position_ws, ray.direction, ray.ng, u.x, hit, distance);
+    vec2 u = fract(sobol_2d(view.subframe, 40u) + unit_shift(hash_u32(uvec2(pixel + view.pixel_offset))));
+    ReflectedRay ray = reflected_ray(pixel, u);
+    traced = NO_LIGHT;
+    traced_ray = vec4(ray.direction, ray.pdf);
+    if (ray.passes) {
+        bool hit;
+        float distance;
+        vec3 radiance = rsm_ray(ray.position_ws, ray.direction, ray.ng, u.x, hit, distance);
 #if HAS_MEDIUM
-            radiance *= medium_transmittance(ray.position_ws, ray.direction, distance);
+        radiance *= medium_transmittance(ray.position_ws, ray.direction, distance);
 #endif
-            sum += traced_light(radiance * ray.share, distance);
-        }
+        traced = traced_light(radiance, distance);
     }
-    traced = sum / float(glossy_rays);
 }

@@ -12,14 +12,16 @@ void main()
     ivec2 pixel = ivec2(gl_FragCoord.xy);
     float depth = texelFetch(gbuf_depth, pixel, 0).r;
     traced = NO_LOBE;
+    traced_ray = vec4(0.0);
     Lobe lobe = lobe_unpack(texelFetch(gbuf_specular, pixel, 0), texelFetch(gbuf_lobe, pixel, 0));
     if (depth <= 0.0 || !lobe_reflects(lobe)) {
         return;
     }
     // Every pixel's points are the sequence's, turned by its own offset (R. Cranley and T. Patterson, 1976).
     uint seed = hash_u32(uvec2(pixel + view.pixel_offset));
-    ReflectedRay ray = reflected_ray(lobe, pixel, depth, fract(sobol_2d(view.subframe, 40u) + unit_shift(seed)));
+    ReflectedRay ray = reflected_ray(pixel, fract(sobol_2d(view.subframe, 40u) + unit_shift(seed)));
     traced = NO_LIGHT;
+    traced_ray = vec4(ray.direction, ray.pdf);
     if (ray.passes) {
         bool hit;
         float distance;
@@ -28,6 +30,6 @@ void main()
 #if HAS_MEDIUM
         radiance *= medium_transmittance(ray.position_ws, ray.direction, distance);
 #endif
-        traced = traced_light(radiance * ray.share, distance);
+        traced = traced_light(radiance, distance);
     }
 }

@@ -28,12 +28,14 @@ void main()
     }
     vec4 indirect = NO_LOBE;
     vec4 sources = NO_LOBE;
+    vec4 way = vec4(0.0);
     float depth = texelFetch(gbuf_depth, pixel, 0).r;
     Lobe lobe = lobe_unpack(texelFetch(gbuf_specular, pixel, 0), texelFetch(gbuf_lobe, pixel, 0));
     if (depth > 0.0 && lobe_reflects(lobe)) {
         indirect = sources = NO_LIGHT;
         uint seed = hash_u32(uvec2(pixel + view.pixel_offset));
-        ReflectedRay ray = reflected_ray(lobe, pixel, depth, fract(sobol_2d(view.subframe, 42u) + unit_shift(seed)));
+        ReflectedRay ray = reflected_ray(pixel, fract(sobol_2d(view.subframe, 42u) + unit_shift(seed)));
+        way = vec4(ray.direction, ray.pdf);
         if (ray.passes) {
             Traced hit = trace(ray.position_ws, ray.direction, 2.0 * view.scene_radius, ssdo_thickness);
             float distance = hit.found ? hit.distance : NOT_FOUND;
@@ -45,7 +47,7 @@ void main()
             if (front) {
                 vec2 inside = min(hit.at, view.resolution - hit.at) / (FADE * view.resolution.y);
                 known = smoothstep(0.0, 1.0, min(inside.x, inside.y));
-                indirect = traced_light(ray.share * known * texelFetch(ssdo_shaded, met, 0).rgb, distance);
+                indirect = traced_light(known * texelFetch(ssdo_shaded, met, 0).rgb, distance);
 #if TRACE_EMISSION
                 light += known * texelFetch(gbuf_emission, met, 0).rgb;
 #endif
@@ -55,11 +57,14 @@ void main()
                 light += (1.0 - known) * world_radiance(ray.direction);
             }
 #endif
-            sources = traced_light(ray.share * light, distance);
+            sources = traced_light(light, distance);
         }
     }
 #if HAS_TRACED
     imageStore(traced, pixel, indirect);
+#endif
+#if HAS_TRACED_RAY
+    imageStore(traced_ray, pixel, way);
 #endif
 #if HAS_TRACED_SOURCES
     imageStore(traced_sources, pixel, sources);

@@ -16,18 +16,20 @@ void main()
     ivec2 pixel = ivec2(gl_FragCoord.xy);
     float depth = texelFetch(gbuf_depth, pixel, 0).r;
     traced = NO_LOBE;
+    traced_ray = vec4(0.0);
     Lobe lobe = lobe_unpack(texelFetch(gbuf_specular, pixel, 0), texelFetch(gbuf_lobe, pixel, 0));
     if (depth <= 0.0 || !lobe_reflects(lobe)) {
         return;
     }
     // Each pixel turns the sequence by its own number (R. Cranley and T. Patterson, 1976).
     vec2 turn = unit_shift(hash_u32(uvec2(pixel + view.pixel_offset)));
-    ReflectedRay ray = reflected_ray(lobe, pixel, depth, fract(sobol_2d(view.subframe, 43u) + turn));
+    ReflectedRay ray = reflected_ray(pixel, fract(sobol_2d(view.subframe, 43u) + turn));
     traced = NO_LIGHT;
+    traced_ray = vec4(ray.direction, ray.pdf);
     if (ray.passes) {
         Grid grid = voxel_grid();
         float spread = min(2.0 * sqrt(2.0 / cone_sets) * ray.alpha, 1.0);
         ConeResult result = trace_seen(grid, surface_cone(grid, ray.position_ws, ray.ng, ray.direction, spread, 1e30));
-        traced = traced_light(result.radiance * ray.share, result.first.t * grid.cell);
+        traced = traced_light(result.radiance, result.first.t * grid.cell);
     }
 }
