@@ -17,8 +17,9 @@
 // 1 + ε times as large; so does another alpha, √2 α being as much wider. Round 1 has ε and no Δr, round 2 has ε/4: with ε = .08
 // the lobe is 5 % wider, √1.1, and no more at a contact, where t is small. Mirrors have no neighbours.
 //
-// 1/t is its mean over what a pixel's neighbours met, not its own ray's: weights that hang on a ray would prefer some rays to
-// others.
+// Weights that hang on a ray's own t would prefer some rays to others. So t is what the pixels around met, in round 1 a typical
+// value; and what a ray met that is nearer than |Δx| over two standard deviations of the angle is no neighbour's to draw: as for
+// directions below its horizon, p_q = 0 there, and p's own rays count in full.
 
 #include "lib/view_lib.glsl"
 #include "lib/bsdf_lib.glsl"
@@ -54,22 +55,23 @@ bool outside(ivec2 pixel)
     return any(lessThan(pixel, ivec2(0))) || any(greaterThanEqual(pixel, textureSize(FOUND, 0)));
 }
 
-// Mean nearness around a pixel.
-float mean_nearness(ivec2 pixel)
+// Nearness of what is mirrored around a pixel: the mean's square of its root, which a few rays to a contact do not rule.
+float typical_nearness(ivec2 pixel)
 {
     vec2 sum = vec2(0.0);
     for (int y = -1; y <= 1; ++y) {
         for (int x = -1; x <= 1; ++x) {
             ivec2 other = clamp(pixel + ivec2(x, y), ivec2(0), textureSize(FOUND, 0) - 1);
             float nearness = texelFetch(FOUND, other, 0).a;
-            sum += nearness >= 0.0 ? vec2(nearness, 1.0) : vec2(0.0);
+            sum += nearness >= 0.0 ? vec2(sqrt(nearness), 1.0) : vec2(0.0);
         }
     }
-    return sum.x / sum.y;
+    return sqr(sum.x / sum.y);
 }
 
-// Adds what pixel `other` has to share. `own_ray` is `here`'s: direction, density.
-void ask(ivec2 other, Glossy here, Lobe lobe, vec4 own_ray, float nearness, float variance, inout Sum sum)
+// Adds what pixel `other` has to share. `own_ray` is `here`'s: direction, density; and the nearness of what it met.
+void ask(ivec2 other, Glossy here, Lobe lobe, vec4 own_ray, float own_nearness, float nearness, float variance,
+         inout Sum sum)
 {
     if (outside(other)) {
         return;
@@ -79,17 +81,21 @@ void ask(ivec2 other, Glossy here, Lobe lobe, vec4 own_ray, float nearness, floa
     if (found.a < 0.0 || !there.exists) {
         return;
     }
-    vec3 off = (there.position_ws - here.position_ws) * nearness;
+    vec3 off = there.position_ws - here.position_ws;
 #if SHARING_ROUND == 1
-    float w = exp(-0.5 * dot(off, off) / variance);
+    float beside = dot(off, off);
+    float w = exp(-0.5 * beside * sqr(nearness) / variance);
     vec4 ray = texelFetch(traced_ray, other, 0);
     float density = reflected_pdf(here, ray.xyz);
-    if (ray.w > 0.0 && density > 0.0) {
+    if (ray.w > 0.0 && density > 0.0 && beside * sqr(found.a) <= 4.0 * variance) {
         sum.light += w * RAYS * density / (RAYS * ray.w + density) * reflected_share(here, lobe, ray.xyz) * found.rgb;
     }
-    sum.own += own_ray.w > 0.0 ? w * own_ray.w / (RAYS * reflected_pdf(there, own_ray.xyz) + own_ray.w) : 0.0;
+    if (own_ray.w > 0.0) {
+        float other_density = beside * sqr(own_nearness) <= 4.0 * variance ? reflected_pdf(there, own_ray.xyz) : 0.0;
+        sum.own += w * own_ray.w / (RAYS * other_density + own_ray.w);
+    }
 #else
-    off += reflect(-there.v, there.n) - reflect(-here.v, here.n);
+    off = off * nearness + reflect(-there.v, there.n) - reflect(-here.v, here.n);
     float wider = sqrt(2.0) * (there.alpha - here.alpha);
     float w = exp(-0.5 * (dot(off, off) + sqr(wider)) / variance);
     sum.light += w * found.rgb;
@@ -112,14 +118,14 @@ void main()
         light.rgb *= own_ray.w > 0.0 ? reflected_share(here, lobe, own_ray.xyz) : vec3(0.0);
 #endif
 #if SHARING_ROUND > 0
-        float nearness = SHARING_ROUND == 1 ? mean_nearness(pixel) : light.a;
+        float nearness = SHARING_ROUND == 1 ? typical_nearness(pixel) : light.a;
         float variance = 2.0 * WIDENING * sqr(here.alpha);
         // A step of one pixel on a surface that faces the eye turns the mirrored ray by its own angle, and what is mirrored
         // is as much farther off.
         float turn = pixel_width(texelFetch(gbuf_depth, pixel, 0).r) * nearness;
         turn += SHARING_ROUND == 1 || view.orthographic > 0.5 ? 0.0 : view.pixel_size;
         float reach = min(2.0 * sqrt(variance) / max(turn, 1e-20), FARTHEST * view.resolution.y);
-        Sum sum = Sum(vec3(0.0), 1.0, nearness, 1.0);
+        Sum sum = Sum(vec3(0.0), 1.0, light.a, 1.0);
         if (reach > 0.5) {
             uint seed = hash_u32(uvec3(pixel + view.pixel_offset, 2u * view.subframe + uint(SHARING_ROUND)));
             vec2 shift = unit_shift(seed);
@@ -127,8 +133,8 @@ void main()
                 vec2 u = fract(r2_sequence(uint(i)) + shift);
                 float phi = PI * u.y;
                 ivec2 step_ = ivec2(round(reach * sqrt(u.x) * vec2(cos(phi), sin(phi))));
-                ask(pixel + step_, here, lobe, own_ray, nearness, variance, sum);
-                ask(pixel - step_, here, lobe, own_ray, nearness, variance, sum);
+                ask(pixel + step_, here, lobe, own_ray, light.a, nearness, variance, sum);
+                ask(pixel - step_, here, lobe, own_ray, light.a, nearness, variance, sum);
             }
         }
         light = vec4(light.rgb * sum.own + sum.light, sum.nearness) / sum.weight;

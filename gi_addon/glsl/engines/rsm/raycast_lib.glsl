@@ -89,7 +89,8 @@ bool screen_radiance(vec3 position_ws, vec3 direction, out vec3 radiance)
 
 // Radiance along the ray, W/(m²·sr), with a unit `direction`, from a surface of geometric normal `ng` on the ray's side;
 // `hit` whether anything is there. Cells before the ray is clear of its own surface's may be that surface's: of them only
-// what a light's map confirms counts. `u` in [0, 1) chooses among virtual lights.
+// what a light's map confirms counts: a surface whose lit side the ray enters, or one that it would leave by that side, having come
+// through from its dark side (from a room through its wall to where the sun shines). `u` in [0, 1) chooses among virtual lights.
 vec3 rsm_ray(vec3 origin_ws, vec3 direction, vec3 ng, float u, out bool hit, out float distance)
 {
     float clear = dot(abs(ng), vec3(1.0)) / max(dot(direction, ng), 1e-3);
@@ -112,6 +113,9 @@ vec3 rsm_ray(vec3 origin_ws, vec3 direction, vec3 ng, float u, out bool hit, out
         float low = max(run.x - 1.0, 0.0) * cell_size;
         float step_ = (min(run.y + 1.0, far) * cell_size - low) / float(RAY_POINTS);
         bool lit_through = false;
+        float stop = NO_SURFACE; // the first surface that is met from its dark side
+        vec3 stop_albedo = vec3(-1.0);
+        vec3 stop_normal = vec3(0.0);
         for (int i = 0; i < rsm_light_count; ++i) {
             Light light = rsm_lights[i];
             if (light.views <= 0) {
@@ -120,6 +124,9 @@ vec3 rsm_ray(vec3 origin_ws, vec3 direction, vec3 ng, float u, out bool hit, out
             bool before = false;
             bool all_lit = true;
             bool found = false;
+            bool under = false; // just below a lit surface
+            bool leaves = false;
+            float leaves_at = low;
             float a = low;
             float b = low;
             for (int k = 0; k <= RAY_POINTS; ++k) {
@@ -135,9 +142,35 @@ vec3 rsm_ray(vec3 origin_ws, vec3 direction, vec3 ng, float u, out bool hit, out
                     b = at;
                     a = found ? at - step_ : a;
                     before = known && gap > 0.0;
+                    if (!leaves && under && before && gap < step_ + cell_size) {
+                        leaves = true;
+                        leaves_at = at;
+                    }
+                    under = known && gap <= 0.0 && gap > -(step_ + cell_size);
                 }
             }
             lit_through = lit_through || all_lit;
+            if (leaves) {
+                int index = 0;
+                ivec2 texel = ivec2(0);
+                float under_at = leaves_at - step_;
+                for (int k = 0; k < RAY_HALVINGS; ++k) {
+                    bool known;
+                    float middle = 0.5 * (under_at + leaves_at);
+                    bool behind = rsm_gap(light, origin_ws + direction * middle, known, index, texel) <= 0.0;
+                    under_at = behind ? middle : under_at;
+                    leaves_at = behind ? leaves_at : middle;
+                }
+                bool known;
+                float gap = rsm_gap(light, origin_ws + direction * leaves_at, known, index, texel);
+                RsmTexel s = rsm_texel(index, texel);
+                bool own = abs(dot(s.normal_ws, ng)) > OWN_FACING && leaves_at * dot(direction, ng) < OWN_HEIGHT * cell_size;
+                if (known && gap < cell_size && s.area > 0.0 && dot(s.normal_ws, direction) > 0.0 && !own && leaves_at < stop) {
+                    stop = leaves_at;
+                    stop_albedo = texelFetch(rsm_albedo, texel, 0).rgb;
+                    stop_normal = -s.normal_ws;
+                }
+            }
             if (!found) {
                 continue;
             }
@@ -164,6 +197,13 @@ vec3 rsm_ray(vec3 origin_ws, vec3 direction, vec3 ng, float u, out bool hit, out
                 }
                 hit = true;
             }
+        }
+        if (stop < distance - OWN_HEIGHT * cell_size) {
+            hit = true;
+            radiance = vec3(0.0);
+            distance = stop;
+            albedo = stop_albedo;
+            normal_ws = stop_normal;
         }
         // Seen by no light, and not seen past by any: an unlit surface ends the ray.
         if (!hit && !lit_through && run.x > clear) {
