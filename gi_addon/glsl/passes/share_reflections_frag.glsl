@@ -37,7 +37,7 @@
 
 const float WIDENING = SHARING_ROUND == 1 ? 0.08 : 0.02;
 // Pairs of opposite pixels that are asked in each round.
-const int PAIRS = SHARING_ROUND == 1 ? 12 : 6;
+const int PAIRS = SHARING_ROUND == 1 ? 16 : 6;
 // k: a disc to two σ has weights of .43 in the mean.
 const float RAYS = 0.86 * float(PAIRS);
 // No neighbour is farther off than this share of the picture's height, however far what is mirrored.
