@@ -144,8 +144,8 @@ def test_what_is_off_or_not_there_shares_nothing(technique):
 
 
 def dark_room(*, sun_on_the_wall: bool):
-    """A closed room of zero-thickness walls with a floor of rough metal, seen at the foot of a wall; outside, a second wall in the
-    sun. ``sun_on_the_wall``: another sun shines on the first wall's outside."""
+    """A closed room of zero-thickness walls with a floor of rough metal, seen at the foot of a wall; outside, a second wall in
+    the sun. ``sun_on_the_wall``: another sun shines on the first wall's outside."""
     b = scenes.SceneBuilder()
     walls = scenes.box_quads((-1.5, -1.0, 0.0), (1.5, 1.0, 1.5))
     floor = np.abs(walls[..., 2]).max(axis=1) < 1e-6
@@ -160,8 +160,8 @@ def dark_room(*, sun_on_the_wall: bool):
 
 @pytest.mark.parametrize("technique", ["RSM", "LPV"])
 def test_rays_at_the_foot_of_a_wall_do_not_leave_the_room(gl, technique):
-    """It is dark inside. Rays that start within a cell of a wall would pass it; they stop where the picture shows the wall, or a
-    light's map its other side: of the second wall's radiance less than 2 % comes in, and less where a light shines on the wall."""
+    """It is dark inside. Rays that start within a cell of a wall would pass it; they stop where the picture shows the wall, or
+    a light's map its other side: of the second wall's radiance less than 2 % comes in, less where a light shines on the wall."""
     known, unknown = (mirrored(dark_room(sun_on_the_wall=s), technique).mean() for s in (True, False))
     assert unknown < 0.02 * 0.5 * 5.0 / np.hypot(1.0, 0.5) / np.pi
     assert known < 0.5 * unknown

@@ -91,8 +91,8 @@ bool screen_radiance(vec3 position_ws, vec3 direction, out vec3 radiance)
 }
 #endif
 
-// Whether the ray meets a surface that the picture shows within `reach` (m): it passes through the plane of a pixel that it is seen
-// at, from before it to less than a cell behind.
+// Whether the ray meets a surface that the picture shows within `reach` (m): it passes through the plane of a pixel that it is
+// seen at, from before it to less than a cell behind.
 bool meets_on_screen(vec3 origin_ws, vec3 direction, float reach, out float distance)
 {
     bool met = false;
@@ -119,8 +119,8 @@ bool meets_on_screen(vec3 origin_ws, vec3 direction, float reach, out float dist
 
 // Radiance along the ray, W/(m²·sr), with a unit `direction`, from a surface of geometric normal `ng` on the ray's side;
 // `hit` whether anything is there. Cells before the ray is clear of its own surface's may be that surface's: of them only
-// what a light's map confirms counts: a surface whose lit side the ray enters, or one that it would leave by that side, having come
-// through from its dark side (from a room through its wall to where the sun shines). `u` in [0, 1) chooses among virtual lights.
+// what the picture shows or a light's map confirms counts: a surface whose lit side the ray enters, or that it would leave by that
+// side, coming from its dark one (from a room through its wall into the sun). `u` in [0, 1) chooses among virtual lights.
 vec3 rsm_ray(vec3 origin_ws, vec3 direction, vec3 ng, float u, out bool hit, out float distance)
 {
     float clear = dot(abs(ng), vec3(1.0)) / max(dot(direction, ng), 1e-3);
