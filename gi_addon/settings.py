@@ -185,10 +185,6 @@ class LPVSettings:
                  ("48", "48", "Fastest"), ("72", "72", "For 32 cells"), ("144", "144", "For 64 cells"),
                  ("288", "288", "For 128 cells")),
     )  # fmt: skip
-    glossy_rays: int = _setting(
-        2, "Glossy Rays", "Rays through the grid per pixel and sub-frame for glossy reflections", low=1, high=64,
-        higher="less noise on rough surfaces", lower="faster",
-    )  # fmt: skip
     occlusion: bool = _setting(True, "Occlusion", "Objects stop light on its way through the grid")
 
 
@@ -278,6 +274,9 @@ class Settings:
     technique: str = _setting("RSM", "Technique", "How light bounces", choices=TECHNIQUES)
     use_indirect_diffuse: bool = _setting(True, "Indirect Diffuse", "Light that bounced off surfaces onto surfaces")
     use_glossy: bool = _setting(True, "Glossy Reflections", "What glossy surfaces mirror")
+    share_reflections: bool = _setting(
+        True, "Share Reflections", "Pixels of one surface share what their reflected rays found; rough reflections need it"
+    )
     use_shadows: bool = _setting(True, "Shadows", "Lights are blocked by objects")
     use_ao: bool = _setting(True, "Ambient Occlusion", "Near surfaces block light that nothing else tests")
     use_translucency: bool = _setting(True, "Translucency", "Light through and inside objects")

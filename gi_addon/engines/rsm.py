@@ -20,10 +20,10 @@ from ..passes.direct_lighting import DirectLighting, TranslucentLighting
 from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint, gather_size
 from ..passes.lights import LightList, RSMGeneration, ShadowMaps
 from ..passes.occupancy import CELL_UNIFORMS, Occupancy, set_cells
+from ..passes.reflections import GLOSSY_RAY, GLOSSY_TRACED, reflection_sharing
 from ..passes.resolve import Resolve
 from ..passes.screen import (
     INDIRECT_DIFFUSE,
-    INDIRECT_GLOSSY,
     LOBE,
     REFRACTING,
     TRANSMISSION_INDIRECT,
@@ -65,6 +65,7 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         Subsurface(),
         TranslucentLighting(),
         GlossyReflections(),
+        *reflection_sharing(settings),
         Refraction(),
         Volumetric(),
         Resolve(layers),
@@ -320,7 +321,7 @@ class GlossyReflections(ScreenPass):
     title = "RSM Glossy Reflections"
     figure = "Ray Casting in RSM"
     reads = (*_RAY_READS, *LOBE)
-    writes = (INDIRECT_GLOSSY,)
+    writes = (GLOSSY_TRACED, GLOSSY_RAY)
     uniforms = _RAY_UNIFORMS
     fragment = "engines/rsm/glossy_frag.glsl"
 
