@@ -15,6 +15,8 @@ import numpy as np
 from .focus import Focus
 
 MOST_GRIDS = 4
+# Cells at a side of an inner grid that nothing is looked up in: around a point farther in, all eight cells are the grid's own.
+RIM = 2
 # A beam is spread by √(distance × cell) on its way from cell to cell. Light flies one free path ℓ from surface to surface: it
 # spreads by no more than half of that in cells up to ℓ/4.
 _CELLS_PER_PATH = 4.0
@@ -54,9 +56,10 @@ class Grid:
         return int(np.prod(self.size))
 
     def around(self, eye: np.ndarray, core: np.ndarray, resolution: int, whole: Grid) -> Grid:
-        """The grid of half as wide cells within this one, at most ``resolution`` of them along a side: about ``eye`` (3,), but
-        no farther out than it still holds, or lies in, the box ``core`` (2, 3) of what matters. ``whole`` is the outermost."""
-        most = resolution - resolution % 2
+        """The grid of half as wide cells within this one, at most ``resolution`` of them along a side and those of the rims: about
+        ``eye`` (3,), but no farther out than it still holds, or lies in, the box ``core`` (2, 3) of what matters. ``whole`` is the
+        outermost."""
+        most = resolution - resolution % 2 + 2 * RIM
         size = np.minimum(2 * np.array(self.size), most)
         extent = size * self.cell / 2.0
         pad = self.cell
