@@ -56,9 +56,9 @@ class Grid:
         return int(np.prod(self.size))
 
     def around(self, eye: np.ndarray, core: np.ndarray, resolution: int, whole: Grid) -> Grid:
-        """The grid of half as wide cells within this one, at most ``resolution`` of them along a side and those of the rims: about
-        ``eye`` (3,), but no farther out than it still holds, or lies in, the box ``core`` (2, 3) of what matters. ``whole`` is the
-        outermost."""
+        """The grid of half as wide cells within this one, at most ``resolution`` of them along a side and those of the rims:
+        about ``eye`` (3,), but no farther out than it still holds, or lies in, the box ``core`` (2, 3) of what matters. ``whole``
+        is the outermost."""
         most = resolution - resolution % 2 + 2 * RIM
         size = np.minimum(2 * np.array(self.size), most)
         extent = size * self.cell / 2.0

@@ -22,7 +22,9 @@ class Preset:
 
 
 # What a preset of our own takes back of the paper's.
-_OURS: dict[str, Any] = {"rsm.visibility": "CELLS", "vct.shadow_cones": False, "vct.continuous_voxelization": False, "lpv.cascades": "AUTO"}
+_OURS: dict[str, Any] = {
+    "rsm.visibility": "CELLS", "lpv.cascades": "AUTO", "vct.shadow_cones": False, "vct.continuous_voxelization": False,
+}  # fmt: skip
 
 PRESETS: dict[str, Preset] = {
     "PAPER": Preset(

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from conftest import make
@@ -35,7 +37,7 @@ def test_inner_grids_lie_on_the_cells_of_the_one_around_wherever_the_eye_is(eye)
     found = nested_grids(Focus.on(BOX), 32, MOST_GRIDS, np.array(eye))
     sizes = [g.size for g in nested_grids(Focus.on(BOX), 32, MOST_GRIDS, np.array([7.0, 7.0, 7.0]))]
     assert [g.size for g in found] == sizes
-    for outer, inner in zip(found, found[1:], strict=False):
+    for outer, inner in pairwise(found):
         assert inner.cell == outer.cell / 2.0
         low = (np.array(inner.origin) - outer.origin) / outer.cell
         high = low + np.array(inner.size) / 2.0
@@ -105,11 +107,11 @@ def test_light_is_the_closed_form_on_both_sides_of_a_rim(gl):
 
 
 def test_a_step_of_the_camera_over_a_cell_does_not_flicker(gl):
-    """Stability test 8 with an inner grid: as the camera goes two cells along, the light of each place on the wall changes by
+    """Stability test 8 with an inner grid: as the camera goes a cell along, the light of each place on the wall changes by
     less than .5 % in the mean, and not at all where the grid stands still."""
-    cell = nested_grids(find_focus(scenes.corner()), 16, 2, np.zeros(3))[0].cell
+    cell = nested_grids(find_focus(scenes.corner()), 32, 2, np.zeros(3))[0].cell
     means, places = [], []
-    for k in range(5):
+    for k in range(3):
         scene = near_corner()
         scene.camera = scenes.orthographic((0.0, 0.6, 0.45), (0.0, 0.0, 0.45), 0.8, aspect=16 / 9)
         # The picture stays, the camera that the grids follow goes along: an orthographic view shifted back.
@@ -121,13 +123,13 @@ def test_a_step_of_the_camera_over_a_cell_does_not_flicker(gl):
         back = view_from_world[:3, :3] @ np.array([k * cell / 2.0, 0.0, 0.0])
         projection[:, 3] += projection[:, :3] @ back
         scene.camera.clip_from_view = projection
-        image = indirect(scene, lpv__resolution=16, lpv__cascades="2")
+        image = indirect(scene, lpv__cascades="2", lpv__directions="48")
         means.append(image.mean())
-        places.append(nested_grids(find_focus(scene), 16, 2, matrix[:3, 3])[1].low)
+        places.append(nested_grids(find_focus(scene), 32, 2, matrix[:3, 3])[1].low)
     jumps = np.abs(np.diff(means)) / means[0]
     assert len(set(places)) >= 2
     assert jumps.max() <= 0.005
-    assert all(j < 1e-5 for j, a, b in zip(jumps, places, places[1:], strict=False) if a == b)
+    assert all(j < 1e-5 for j, a, b in zip(jumps, places[:-1], places[1:], strict=True) if a == b)
 
 
 def test_props_on_a_kilometre_of_ground_have_the_light_of_a_small_one(gl):
@@ -147,12 +149,13 @@ def test_all_that_looks_light_up_knows_all_grids(gl, bounces):
     sides = scenes.box_quads((-1, -1, 0), (1, 1, 2), inward=True)
     b.quads(sides[[0, 1, 2, 4, 5]], scenes.diffuse((0.7,) * 3))
     b.quads(sides[[3]], scenes.principled(**{"Base Color": (0.9, 0.9, 0.9, 1.0), "Metallic": 1.0, "Roughness": 0.1}))
+    b.quads(scenes.box_quads((0.31, 0.59, 0.0), (0.47, 0.77, 0.33)), scenes.diffuse((0.5,) * 3))
     b.light(scenes.point_light((0.3, 0.2, 1.5), 50.0))
-    scene = b.build(scenes.perspective((0.5, -0.5, 0.7), (0.0, 1.0, 0.7), 1.2, clip=(0.01, 10)))
+    scene = b.build(scenes.perspective((0.6, 0.3, 0.45), (0.5, 1.0, 0.4), 1.4, clip=(0.01, 10)))
     outputs = ("Glossy Indirect", "Ambient Occlusion")
     one, two = (
         make(scene, *outputs, technique="LPV", samples=2, resolution=(48, 27), bounces=bounces, lpv__resolution=16,
-             lpv__cascades=c).passes
+             lpv__cascades=c, ao__distance=0.6).passes
         for c in ("1", "2")
     )  # fmt: skip
     for name in outputs:
