@@ -11,7 +11,7 @@ from .focus import Focus, find_focus
 from .lights import Emitters, LightRig, build_rig
 from .materials import CompiledGraph, Medium, mean_medium
 from .outputs import film_layers
-from .scene import CAMERA, Scene
+from .scene import CAMERA, CATCHER, Scene
 from .settings import Settings
 from .world_map import WorldMap
 
@@ -41,6 +41,7 @@ class Facts:
     world_black: bool
     ao_distance: float
     world_visible: bool = True  # to the camera
+    catchers: bool = False  # the camera sees objects of which only the shadow on them shows
     medium: Medium | None = None  # that fills the world, or the box
     medium_box: np.ndarray | None = None  # (2, 3) world space, m; None: everywhere
     margin: int = 0  # px drawn beyond each side of the picture
@@ -147,6 +148,7 @@ def gather_facts(
         world_black=world is None or world.black,
         ao_distance=s.ao.distance or scene.world.ao_distance,
         world_visible=scene.world.visible_camera,
+        catchers=bool((scene.instances.visibility[seen > 0] & CATCHER).any()),
         medium=medium,
         medium_box=medium_box,
         stamps=scene.stamps(),

@@ -10,7 +10,8 @@ from ..facts import Facts
 from ..frame import Frame
 from ..gpu_types import LIGHT, LIGHT_VIEW
 from ..graph import Buffer, Optional, Pass, Planned, Texture, Uniform
-from ..scene import DIFFUSE, SHADOW
+from ..lights import LightRig
+from ..scene import DIFFUSE, SHADOW, blocker_set, receiver_set
 
 _VERTEX = "surface/surface_vert.glsl"
 _UNIFORMS = (
@@ -95,7 +96,9 @@ class RSMGeneration(Pass):
         Buffer("rsm.views", "rsm_views", "what the maps show", "LightView", LIGHT_VIEW,
                lambda f: max(1, len(f.rig.bounce.sizes))),
     )  # fmt: skip
-    uniforms = _UNIFORMS
+    uniforms = (
+        *_UNIFORMS, Uniform("light_reaches", "float", "1 where the light shines on what is drawn, 0 where it is only blocked"),
+    )  # fmt: skip
     depends = ("lights", "world", "transforms", "meshes", "materials")
     settings = ("rsm.resolution", "world.resolution", "world.samples")
 
@@ -157,5 +160,20 @@ def draw_light_maps(frame: Frame, planned: Planned, visibility: int, fragment: s
                 light_perspective=float(view["perspective"]),
             )
         clip = np.ascontiguousarray(sample.clip_from_world[i].T, "f4")
-        beyond = None if full else rig.beyond(i, int(view["light"]))
-        frame.gpu.draw(planned, stages, visibility, clip, beyond=beyond, **options)
+        index = int(view["light"])
+        beyond = None if full else rig.beyond(i, index)
+        for reaches, among in _linked(rig, index, frame.gpu.bits(visibility), full):
+            for program in programs if full else ():
+                frame.set(program, light_reaches=reaches)
+            frame.gpu.draw(planned, stages, visibility, clip, beyond=beyond, among=among, **options)
+
+
+def _linked(rig: LightRig, index: int, bits: tuple[int, ...], full: bool) -> list[tuple[float, tuple[int, ...] | None]]:
+    """(whether source ``index`` lights them, visibility bits) of what its map shows: what shades it and, in a bounce map
+    (``full``), what it lights."""
+    lit = tuple(b for b in bits if rig.lights_kind(index, receiver_set(b)))
+    dark = tuple(b for b in bits if rig.blocked_by(index, blocker_set(b)) and b not in lit)
+    if not full:
+        shades = tuple(b for b in bits if rig.blocked_by(index, blocker_set(b)))
+        return [(1.0, None if shades == bits else shades)]
+    return [(1.0, None if lit == bits else lit), *([(0.0, dark)] if dark else [])]

@@ -27,6 +27,9 @@ void main()
     if (held) {
         c = closure_none();
     }
+    if (object_catcher > 0.5) {
+        c = closure_none(); // nothing of its own: the film asks for its shadow
+    }
     float gain = opacity > 0.0 ? 1.0 / opacity : 1.0;
     vec3 n = safe_normalize(c.normal_ws);
     if (dot(n, n) < 0.5) {
@@ -34,7 +37,10 @@ void main()
     }
     // Rounding of the interpolants alone lifts flat triangles by parts in a million of their place.
     float bulge = surface_bulge();
-    gbuf_depth = vec2(depth, held ? -1.0 : bulge > 1e-5 * length(vary_relative_ws) ? bulge : 0.0);
+    gbuf_depth = vec2(depth, object_catcher > 0.5 ? -2.0 : held ? -1.0 : bulge > 1e-5 * length(vary_relative_ws) ? bulge : 0.0);
+#if HAS_GBUF_SET
+    gbuf_set = object_set;
+#endif
 #if HAS_GBUF_NORMAL
     gbuf_normal = vec4(octahedral_encode(n), octahedral_encode(p.geometric_normal_ws));
 #endif
