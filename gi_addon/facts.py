@@ -47,6 +47,8 @@ class Facts:
     margin: int = 0  # px drawn beyond each side of the picture
     stamps: dict[str, str] = field(default_factory=dict)
     emitters: Emitters = field(default_factory=Emitters.none)  # all of them, sampled as lights or not
+    focus: Focus = field(default_factory=lambda: Focus.on(np.zeros((2, 3))))
+    eye: np.ndarray = field(default_factory=lambda: np.zeros(3))  # the camera's place, world space, m
 
     @property
     def glowing_voxels(self) -> bool:
@@ -93,10 +95,14 @@ def gather_facts(
     world: WorldMap | None,
     emitters: Emitters,
     focus: Focus | None = None,
+    eye: np.ndarray | None = None,
 ) -> Facts:
-    """Look at everything once. ``resolution`` is the picture's; ``focus`` is found where it is not given."""
+    """Look at everything once. ``resolution`` is the picture's; ``focus`` is found where it is not given, ``eye`` is then the
+    scene's own camera's."""
     margin = round(settings.ssdo.margin * max(resolution)) if settings.technique == "SSDO" else 0
     focus = focus or find_focus(scene)
+    if eye is None:
+        eye = np.zeros(3) if scene.camera is None else np.asarray(scene.camera.world_from_view, "f8")[:3, 3]
     s = settings
     seen = scene.instances.visibility & CAMERA if len(scene.instances) else np.zeros(0, "u4")
     used = {m for i, ms in enumerate(scene.instances.materials) if seen[i] for m in ms}
@@ -147,6 +153,8 @@ def gather_facts(
         medium_box=medium_box,
         stamps=scene.stamps(),
         emitters=emitters,
+        focus=focus,
+        eye=eye,
     )
 
 

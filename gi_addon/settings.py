@@ -175,9 +175,15 @@ class LPVSettings:
         32, "Resolution", "Cells along the longest side of the scene", low=8, high=128, unit="cells",
         higher="finer indirect light, less leaking through walls", lower="faster",
     )  # fmt: skip
+    cascades: str = _setting(
+        "AUTO", "Cascades", "Grids within each other around the camera, each of cells half as wide as the one around it",
+        choices=(("AUTO", "Automatic", "As many as bring a cell down to a quarter of the way from surface to surface"),
+                 ("1", "1", "One grid over the scene"), ("2", "2", "Cells half as wide around the camera"),
+                 ("3", "3", "A quarter"), ("4", "4", "An eighth")),
+    )  # fmt: skip
     iterations: int = _setting(
-        0, "Iterations", "How many cells far light is carried; 0 is as far as it comes, at the cost of one iteration", low=0,
-        high=512, higher="reaches farther", lower="dark far from lit surfaces; slower than 0 all the same",
+        0, "Iterations", "How many cells far light is carried, in one grid; 0 is as far as it comes, at the cost of one "
+        "iteration", low=0, high=512, higher="reaches farther", lower="dark far from lit surfaces; slower than 0 all the same",
     )  # fmt: skip
     directions: str = _setting(
         "AUTO", "Directions", "Directions that light travels in through the grid; too few for a fine grid show as rays",
