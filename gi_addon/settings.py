@@ -211,8 +211,13 @@ class SSDOSettings:
         soft_high=100.0, unit="m", higher="light from farther away", lower="finer near by, dark rooms",
     )  # fmt: skip
     thickness: float = _setting(
-        0.25, "Thickness", "How thick what the screen shows is taken to be, as a share of its distance from the receiver",
+        0.25, "Thickness", "How thick what the screen shows is taken to be where no layer behind tells, as a share of its "
+        "distance from the receiver",
         low=0.01, high=10.0, higher="fewer leaks behind things", lower="light passes behind thin things",
+    )  # fmt: skip
+    layers: int = _setting(
+        2, "Layers", "How many surfaces behind each other are known at each pixel: those behind the first are not seen, but they "
+        "send light, and say how thick things are", low=1, high=3, higher="light from hidden surfaces", lower="faster",
     )  # fmt: skip
     occlusion: str = _setting(
         "MITTRING", "Ambient Occlusion", "How the Ambient Occlusion pass is made",
@@ -236,7 +241,7 @@ class SSDOSettings:
                   "light must be in the picture")),
     )  # fmt: skip
     margin: float = _setting(
-        0.0, "Margin", "How much is drawn beyond each side of the picture, as a share of its longer side: what lies there "
+        0.25, "Margin", "How much is drawn beyond each side of the picture, as a share of its longer side: what lies there "
         "still counts", low=0.0, high=1.0, higher="light from just outside", lower="faster",
     )  # fmt: skip
     sources: str = _setting(
