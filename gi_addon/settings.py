@@ -161,6 +161,11 @@ class RSMSettings:
         choices=(("NONE", "None", "They shine through everything, as in 2005; near contacts are dimmed by ambient occlusion"),
                  ("CELLS", "Cells", "Rays to them are tested in a grid of the cells that surfaces pass through")),
     )  # fmt: skip
+    visibility_rays: int = _setting(
+        256, "Visibility Rays", "Rays per pixel, of all sub-frames together, to virtual lights drawn by what they send; 0 tests "
+        "all of them",
+        low=0, high=4096, higher="less noise in half shadow", lower="faster, except 0",
+    )  # fmt: skip
     visibility_resolution: int = _setting(
         128, "Visibility Resolution", "Cells along the scene's longest side", low=16, high=512,
         higher="finer shadows in indirect light", lower="faster",

@@ -74,7 +74,20 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
 def _gather_defines(facts: Facts, *, always: bool = False) -> dict[str, int]:
     lamps = any(s.kind == LIGHT_MESH for s in facts.rig.sources)
     untested = {"HAS_OCCUPANCY": 0} if facts.settings.rsm.visibility == "NONE" and not always else {}
-    return {"GATHER_SCALE": facts.settings.gather_scale, "MESH_LIGHTS": int(lamps), **medium_defines(facts), **untested}
+    return {
+        "GATHER_SCALE": facts.settings.gather_scale, "MESH_LIGHTS": int(lamps), "VISIBILITY_RAYS": _rays(facts),
+        **medium_defines(facts), **untested,
+    }  # fmt: skip
+
+
+# Of fewer rays, drawing which virtual lights to test takes longer than the rays.
+_FEWEST_RAYS = 16
+
+
+def _rays(facts: Facts) -> int:
+    """Virtual lights that a pixel tests in a sub-frame; 0: all."""
+    rays = max(-(-facts.settings.rsm.visibility_rays // facts.subframes), _FEWEST_RAYS)
+    return rays if 0 < facts.settings.rsm.visibility_rays and rays < vpl_count(facts) else 0
 
 
 def first_count(facts: Facts) -> int:
