@@ -85,9 +85,11 @@ _FEWEST_RAYS = 16
 
 
 def _rays(facts: Facts) -> int:
-    """Virtual lights that a pixel tests in a sub-frame; 0: all."""
-    rays = max(-(-facts.settings.rsm.visibility_rays // facts.subframes), _FEWEST_RAYS)
-    return rays if 0 < facts.settings.rsm.visibility_rays and rays < vpl_count(facts) else 0
+    """Virtual lights that a pixel tests in a sub-frame; 0: all, as where lights are to add up exactly: which ones are drawn
+    hangs on what the others send."""
+    rsm = facts.settings.rsm
+    rays = max(-(-rsm.visibility_rays // facts.subframes), _FEWEST_RAYS)
+    return rays if rsm.visibility_rays > 0 and not rsm.own_samples and rays < vpl_count(facts) else 0
 
 
 def first_count(facts: Facts) -> int:
@@ -170,6 +172,7 @@ class RSMSamplingPattern(Pass):
     figure = "RSM Sampling Pattern"
     reads = ("rsm.flux", "rsm.depth", "rsm.albedo", "rsm.normal", "rsm.lights", "rsm.views")
     writes = (
+        Buffer("vpls.drawn", "drawn_vpls", "those of the first bounce, as they were drawn", "Vpl", VPL, first_count, scratch=True),
         Buffer("vpls", "vpls", "virtual point lights of this sub-frame", "Vpl", VPL,
                vpl_count),
     )  # fmt: skip
@@ -187,6 +190,7 @@ class RSMSamplingPattern(Pass):
     )
     shaders = {
         "main": {"compute": "engines/rsm/vpls_comp.glsl"},
+        "order": {"compute": "engines/rsm/order_comp.glsl"},
         "air": {"compute": "engines/rsm/air_comp.glsl"},
         "bounce": {"compute": "engines/rsm/bounce_comp.glsl"},
     }
@@ -211,6 +215,9 @@ class RSMSamplingPattern(Pass):
             own_samples=rsm.samples if rsm.own_samples else 0,
         )
         frame.compute(planned, program, (count,), (64,))
+        order = frame.program(planned, "order")
+        frame.set(order, vpl_count=count)
+        frame.compute(planned, order, (count,), (64,))
         if facts.settings.bounces > 1:
             self._more_bounces(frame, planned, count)
         if air_count(facts):
