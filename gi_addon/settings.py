@@ -152,14 +152,19 @@ class RSMSettings:
         higher="less blotchy near surfaces", lower="faster",
     )  # fmt: skip
     own_samples: bool = _setting(
-        False, "Samples of Each Light", "Every light has as many virtual lights of its own, whatever else shines: lights then "
-        "add up exactly",
+        False, "Samples of Each Light", "Every light has as many virtual lights of its own, whatever else shines, and all are "
+        "tested: lights then add up exactly",
         higher="each light as fine as if it shone alone", lower="faster where many lights shine: they share the samples by flux",
     )  # fmt: skip
     visibility: str = _setting(
         "CELLS", "Visibility", "Whether virtual lights are blocked by objects",
         choices=(("NONE", "None", "They shine through everything, as in 2005; near contacts are dimmed by ambient occlusion"),
                  ("CELLS", "Cells", "Rays to them are tested in a grid of the cells that surfaces pass through")),
+    )  # fmt: skip
+    visibility_rays: int = _setting(
+        128, "Visibility Rays", "Rays per pixel, of all sub-frames together, to virtual lights drawn by what they send; 0 tests "
+        "all of them",
+        low=0, high=4096, higher="less noise in half shadow", lower="faster, except 0",
     )  # fmt: skip
     visibility_resolution: int = _setting(
         128, "Visibility Resolution", "Cells along the scene's longest side", low=16, high=512,

@@ -22,7 +22,7 @@ OTHER = {
     "ao.contact": 0.005, "world.samples": 1, "world.aimed": False, "world.rays": 4, "world.resolution": 64,
     "rsm.resolution": 32, "rsm.samples": 7, "rsm.own_samples": True,
     "volume.samples": 2, "volume.density": 0.2, "volume.anisotropy": 0.5, "rsm.visibility": "NONE",
-    "rsm.visibility_resolution": 32,
+    "rsm.visibility_resolution": 32, "rsm.visibility_rays": 32,
     "gather_scale": 1, "motion_steps": None,
     "lpv.resolution": 16, "lpv.iterations": 2, "lpv.directions": "48", "lpv.occlusion": False,
 }  # fmt: skip

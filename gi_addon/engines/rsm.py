@@ -75,7 +75,22 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
 def _gather_defines(facts: Facts, *, always: bool = False) -> dict[str, int]:
     lamps = any(s.kind == LIGHT_MESH for s in facts.rig.sources)
     untested = {"HAS_OCCUPANCY": 0} if facts.settings.rsm.visibility == "NONE" and not always else {}
-    return {"GATHER_SCALE": facts.settings.gather_scale, "MESH_LIGHTS": int(lamps), **medium_defines(facts), **untested}
+    return {
+        "GATHER_SCALE": facts.settings.gather_scale, "MESH_LIGHTS": int(lamps), "VISIBILITY_RAYS": _rays(facts),
+        **medium_defines(facts), **untested,
+    }  # fmt: skip
+
+
+# Of fewer rays, drawing which virtual lights to test takes longer than the rays.
+_FEWEST_RAYS = 16
+
+
+def _rays(facts: Facts) -> int:
+    """Virtual lights that a pixel tests in a sub-frame; 0: all, as where lights are to add up exactly: which ones are drawn
+    hangs on what the others send."""
+    rsm = facts.settings.rsm
+    rays = max(-(-rsm.visibility_rays // facts.subframes), _FEWEST_RAYS)
+    return rays if rsm.visibility_rays > 0 and not rsm.own_samples and rays < vpl_count(facts) else 0
 
 
 def first_count(facts: Facts) -> int:
@@ -158,6 +173,7 @@ class RSMSamplingPattern(Pass):
     figure = "RSM Sampling Pattern"
     reads = ("rsm.flux", "rsm.depth", "rsm.albedo", "rsm.normal", "rsm.lights", "rsm.views")
     writes = (
+        Buffer("vpls.drawn", "drawn_vpls", "those of the first bounce, as they were drawn", "Vpl", VPL, first_count, scratch=True),
         Buffer("vpls", "vpls", "virtual point lights of this sub-frame", "Vpl", VPL,
                vpl_count),
     )  # fmt: skip
@@ -175,6 +191,7 @@ class RSMSamplingPattern(Pass):
     )
     shaders = {
         "main": {"compute": "engines/rsm/vpls_comp.glsl"},
+        "order": {"compute": "engines/rsm/order_comp.glsl"},
         "air": {"compute": "engines/rsm/air_comp.glsl"},
         "bounce": {"compute": "engines/rsm/bounce_comp.glsl"},
     }
@@ -199,6 +216,9 @@ class RSMSamplingPattern(Pass):
             own_samples=rsm.samples if rsm.own_samples else 0,
         )
         frame.compute(planned, program, (count,), (64,))
+        order = frame.program(planned, "order")
+        frame.set(order, vpl_count=count)
+        frame.compute(planned, order, (count,), (64,))
         if facts.settings.bounces > 1:
             self._more_bounces(frame, planned, count)
         if air_count(facts):

@@ -54,6 +54,7 @@ void main()
         vpl.area = PI * pow(0.2387324 * beam * weight / float(view.subframes), 2.0 / 3.0); // 3/4π
     }
 #endif
+    vpl.key = 0u;
     vpl.clear_ws = vpl.position_ws;
     vpls[vpl_count + i] = vpl;
 }
