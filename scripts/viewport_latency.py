@@ -84,7 +84,7 @@ def steps():
         drawn.append((time.perf_counter(), shown))
     bpy.types.SpaceView3D.draw_handler_add(after, (), "WINDOW", "POST_PIXEL")
     answers, details = [], []
-    def wait(start, engine, first, steady):
+    def wait(start, engine, first, steady, drag):
         # Until the picture is there, and then until the engine has drawn all its sub-frames.
         def pictured():
             return any(shown and at > start for at, shown in drawn)
@@ -95,17 +95,19 @@ def steps():
             details.append(dict(kind=first, scale=p.request.scale, total=1e3 * row[2], work=1e3 * p.report.seconds,
                                 sent=sorted(p.sent), passes=[(r.title, r.milliseconds) for r in p.report.rows if r.milliseconds]))
         answers.append(row)
+        if drag:
+            return
         # Eevee redraws by itself until its samples are done; both are quiet for a while then.
         def quiet():
             return time.perf_counter() - drawn[-1][0] > {quiet!r} and (engine != "QUARTET" or settled())
         yield quiet
         if steady:
             row[3] = drawn[-1][0] - start - row[2]
-    def changed(engine, kind, change, steady=False):
+    def changed(engine, kind, change, steady=False, drag=False):
         drawn.clear()
         start = time.perf_counter()
         change()
-        yield from wait(start, engine, kind, steady)
+        yield from wait(start, engine, kind, steady, drag)
     def move():
         scene.objects[name].location.x += 0.05
     def move_lamp():
@@ -127,10 +129,11 @@ def steps():
             space.shading.type = "SOLID"
             yield 0.5
             yield from changed(engine, "rendered chosen", choose(engine), True)
-            for k in range({changes!r}):
-                yield from changed(engine, "object moved", move, k == 0)
-                yield from changed(engine, "light moved", move_lamp)
-                yield from changed(engine, "camera turned", turn)
+            for kind, change in (("object", move), ("light", move_lamp), ("camera", turn)):
+                yield from changed(engine, kind + " moved", change, kind == "object")
+                # The next change comes as soon as the last one is seen, as while something is dragged.
+                for k in range({changes!r}):
+                    yield from changed(engine, kind + " dragged", change, drag=k < {changes!r} - 1)
     report(answers=answers, details=details, size=[region.width, region.height], load=os.getloadavg()[0])
 """
 

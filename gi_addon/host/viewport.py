@@ -25,7 +25,7 @@ from ..gl import Cancelled, CancelToken, GLContextLost, GLError, shared
 from ..graph import Plan
 from ..renderer import Renderer, RenderError
 from ..scene import Camera, Scene
-from ..settings import SettingError, Settings
+from ..settings import SettingError, Settings, walk
 from . import properties, status
 from .sync import SceneSync
 
@@ -229,12 +229,13 @@ class Viewport:
         x, y, width, height = (v // request.scale for v in request.border)
         size = tuple(max(1, v // request.scale) for v in request.size)
         region = (x, y, max(1, min(width, size[0] - x)), max(1, min(height, size[1] - y)))
-        samples = request.settings.viewport_samples
+        settings = coarse(request.settings, request.scale)
+        samples = settings.viewport_samples
         renderer.timers.enabled = request.timed
         renderer.timers.reset()
         if first == 0:
             self._plan = renderer.begin(
-                request.scene, request.settings, resolution=size, region=region, subframes=samples,
+                request.scene, settings, resolution=size, region=region, subframes=samples,
                 camera=request.camera, film_transparent=request.film_transparent,
             )  # fmt: skip
         # A first picture is shown at once, even an outdated one; what only improves it can be given up at any pass.
@@ -357,6 +358,24 @@ class Viewport:
         if ready and engine is not None:
             with contextlib.suppress(ReferenceError):  # Blender has freed it between two ticks
                 engine.tag_redraw()
+
+
+# Settings that say how many rays, points and directions a sub-frame spends; no map or grid hangs on them.
+_EFFORT = ("rsm.samples", "world.rays", "ssdo.samples", "ao.samples", "lpv.glossy_rays")
+
+
+def coarse(settings: Settings, scale: int) -> Settings:
+    """The settings for a picture at 1/``scale`` of the resolution a side, which is shown until nothing changes: as much less
+    effort for each of its pixels. The noise differs, the mean does not; maps and grids are those of the full picture."""
+    if scale == 1:
+        return settings
+    out = settings.copy()
+    for path, _, meta in walk():
+        # Later bounces leave from surface points, which are drawn once for the full picture's samples.
+        kept = path == "rsm.samples" and settings.bounces > 1
+        if path in _EFFORT and out.get(path) > 0 and not kept:
+            out.set(path, max(1, int(meta.low), out.get(path) // scale))
+    return out
 
 
 # --- the view ---------------------------------------------------------------------------------------------------------
