@@ -168,7 +168,7 @@ def inspect_command(
 @click.argument("scenes", nargs=-1, type=click.Path(path_type=Path))
 @_scene_options
 @click.option("--techniques", help="Techniques separated by commas, or 'all'.")
-@click.option("--sweep", type=click.Choice(("none", "samples", "quick", "full")),
+@click.option("--sweep", type=click.Choice(("none", "presets", "samples", "quick", "full")),
               help="How many settings of each technique to try.")
 @click.option("--peers", default="", help="Rivals in the same run: cycles, eevee, or both separated by a comma.")
 @click.option("--blender", metavar="PROGRAM",

@@ -233,7 +233,7 @@ def report_command(
                     progress=lambda text, label=label: console.print(f"{label}: {text}", style="dim", highlight=False),
                 )
         console.print(f"{label}: scores")
-        record = study.scene_record(label, key, size, samples, runs, references, plain.triangle_count())
+        record = study.scene_record(label, key, size, samples, runs, references, plain.triangle_count(), base)
         record["peers"] = {m: v for m, v in versions.items() if any(r.candidate.method == m for r in runs)}
         measured.append(report.Measured(record, runs, references))
         if scene != scenes[-1]:  # what is measured can be looked at while the others are
