@@ -87,8 +87,9 @@ class Renderer:
         subframes: int | None = None,
         camera: Camera | None = None,
         film_transparent: bool = False,
+        moving: bool = False,
     ) -> Plan:
-        """Sync the scene and plan a frame.
+        """Sync the scene and plan a frame. While the view is ``moving`` what only suits the sampling to it stays as it is.
 
         ``resolution`` (width, height) of the whole picture; ``region`` (x, y, width, height) the part to render, row 0
         at the bottom. Raises RenderError when there is nothing to render with.
@@ -116,6 +117,8 @@ class Renderer:
             scene, camera = scene.moved(-origin), camera.moved(-origin)
         # The view that is drawn counts, which need not be the scene's camera.
         stamps = replace(scene, camera=camera).stamps()
+        if moving and self.frame is not None:
+            stamps["camera"] = self.frame.facts.stamps["camera"]
         self.gpu.sync(scene, stamps)
         size = (int(region[2]), int(region[3]))
         subframes = subframes or settings.samples

@@ -46,7 +46,6 @@ class _Panel:
     bl_space_type = "PROPERTIES"
     bl_region_type = "WINDOW"
     bl_context = "render"
-    bl_order = -1  # above Blender's own, as Cycles' are
     COMPAT_ENGINES = {"QUARTET"}
 
     @classmethod
@@ -256,13 +255,10 @@ class QUARTET_PT_performance(_Panel, bpy.types.Panel):
                       f"{report.seconds:.2f} s, {report.mib:.1f} MiB")  # fmt: skip
             column = box.column(align=True)
             for row in report.rows:
-                # Names are long, numbers are not.
-                split = column.split(factor=0.55)
-                split.label(text=row.title)
-                numbers = split.row()
-                numbers.alignment = "RIGHT"
-                time = "" if row.milliseconds is None else f"{row.milliseconds:.1f} ms, "
-                numbers.label(text=f"{time}{row.mib:.1f} MiB")
+                numbers = [f"{row.mib:.1f} MiB"]
+                if row.milliseconds is not None:
+                    numbers = [f"{row.milliseconds:.1f} ms"] if _width() < _NARROW else [f"{row.milliseconds:.1f} ms", *numbers]
+                _row(column, row.title, numbers)
             for title, reason in report.skipped:
                 _say(box, f"{title}: {reason}", "CHECKBOX_DEHLT", active=False)
 
@@ -315,17 +311,17 @@ class QUARTET_PT_compare(_Panel, bpy.types.Panel):
         column = box.column(align=True)
         figures = [("Gain", "gain"), ("relMSE", "rel_mse"), ("Noise", "noise_floor"), ("FLIP", "flip")]
         if _width() < _NARROW:
-            figures = figures[:2]
+            figures = [("relMSE", "rel_mse"), ("FLIP", "flip")]
         _row(column, "Pass", [title for title, _ in figures])
         for name, score in outcome.scores.items():
-            _row(column, name, [f"{getattr(score, figure):.3g}" for _, figure in figures])
+            _row(column, name, [f"{getattr(score, figure):.2g}" for _, figure in figures])
         box.operator(QUARTET_OT_open_page.bl_idname, icon="URL")
         _say(box, "relMSE is the error beyond Cycles' own noise; gain is the ratio of all light")
 
 
 def _row(layout, name: str, cells: list[str]) -> None:
     """A row of a table: a name, and numbers that stand under each other."""
-    split = layout.split(factor=0.45)
+    split = layout.split(factor=0.55 if len(cells) < 3 else 0.4)
     split.label(text=name)
     row = split.row()
     for cell in cells:
@@ -339,7 +335,8 @@ class QUARTET_PT_passes(_Panel, bpy.types.Panel):
     bl_context = "view_layer"
 
     def draw(self, context):
-        column = self._column()
+        # Names as long as these need the whole width.
+        column = self.layout.column()
         for output in OUTPUTS.values():
             owner, _, flag = output.flag.rpartition(".")
             target = getattr(context.view_layer, owner, None) if owner else context.view_layer
@@ -415,7 +412,8 @@ _seen = -1
 
 
 def _watch() -> None:
-    if not bpy.app.timers.is_registered(_look):
+    # Without a window there is nothing to redraw, and Blender 4.5 does not end while such a timer waits.
+    if not bpy.app.background and not bpy.app.timers.is_registered(_look):
         bpy.app.timers.register(_look, first_interval=_LOOK)
 
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import time
 import types
 
 import numpy as np
@@ -568,6 +569,28 @@ def test_a_coarse_picture_makes_no_map_of_the_full_one_again(blender, gl, techni
 
     static, again = gl(job)
     assert static and not again
+
+
+@pytest.mark.blender
+def test_the_full_resolution_waits_until_the_coarse_picture_has_been_seen(blender):
+    """A coarse picture that took a second comes long after its change: the full one still waits .15 s more, so that the next
+    change of a drag does not find the GL thread in a long pass."""
+    from gi_addon.host import viewport
+
+    class Engine:
+        pass
+
+    engine, now = Engine(), time.monotonic()
+    view = viewport.Viewport(engine)
+    try:
+        request = viewport.Request(("key",), None, Settings(), None, (64, 36), (0, 0, 64, 36), False, scale=4)
+        view._request, view._changed, view._pictured = request, now - 1.0, now
+        view._picture = viewport.Picture(request, 1, np.zeros((9, 16, 4), "f4"), 0.9, None)
+        assert not view._due()
+        view._pictured = now - 0.2
+        assert view._due()
+    finally:
+        viewport._live.discard(view)
 
 
 def test_a_sub_frame_given_up_half_way_leaves_no_stale_maps(gl):

@@ -37,7 +37,9 @@ _COARSEST = 4
 _FAST = SLOW / 4.0
 # How long view_draw waits for a picture that should be quick, in seconds: two refreshes of a 60 Hz screen.
 _WAIT = 0.033
-# Time without a change after which the full resolution starts, in seconds: longer than the gap between mouse events.
+# Time without a change after which the full resolution starts, in seconds: longer than the gap between mouse events. It counts
+# from the picture of the last change too: who drags something waits for that before he goes on, and a full frame's slowest pass
+# would then have to be waited for.
 _SETTLE = 0.15
 # A job shows its picture after this many seconds of sub-frames.
 _BATCH = 0.25
@@ -88,7 +90,7 @@ class Viewport:
         self._job: Future | None = None
         self._token = CancelToken()
         self._request: Request | None = None
-        self._changed = 0.0
+        self._changed = self._pictured = 0.0
         self._scale = _COARSEST
         self._first: float | None = None
         self._failed: tuple | None = None
@@ -212,7 +214,7 @@ class Viewport:
         if shown is None or shown.request.key != request.key:
             return True
         if shown.request.scale > 1:
-            return time.monotonic() - self._changed >= _SETTLE
+            return time.monotonic() - max(self._changed, self._pictured) >= _SETTLE
         return shown.subframes < request.settings.viewport_samples
 
     def _work(self, gl, request: Request, first: int, token: CancelToken) -> Picture:
@@ -236,7 +238,7 @@ class Viewport:
         if first == 0:
             self._plan = renderer.begin(
                 request.scene, settings, resolution=size, region=region, subframes=samples,
-                camera=request.camera, film_transparent=request.film_transparent,
+                camera=request.camera, film_transparent=request.film_transparent, moving=request.scale > 1,
             )  # fmt: skip
         # A first picture is shown at once, even an outdated one; what only improves it can be given up at any pass.
         renderer.subframe(first, cancel=token if first or (request.scale == 1 and self._scale > 1) else None)
@@ -287,7 +289,7 @@ class Viewport:
         old = self._picture
         begun = old is None or old.request.key != picture.request.key or old.request.scale != picture.request.scale
         self.counts["subframes"] += picture.subframes - (0 if begun else old.subframes)
-        self._picture = picture
+        self._picture, self._pictured = picture, time.monotonic()
         self._lost = False
         if begun:
             if picture.first > 0.0:
