@@ -130,6 +130,7 @@ class RSMFlux(Pass):
     }
     depends = ("lights", "world", "transforms", "meshes", "materials")
     settings = ("use_volumetric", "volume.density")
+    repeats = True
 
     def rate(self, facts: Facts) -> str:
         return RSMGeneration().rate(facts)

@@ -117,6 +117,7 @@ class RadianceInjection(Pass):
     }
     depends = ("lights", "world", "transforms", "meshes", "materials")
     settings = ("vct.resolution", "vct.emissive_voxels", "vct.cones", "bounces", "use_area_lights")
+    repeats = True
 
     def rate(self, facts: Facts) -> str:
         return RSMGeneration().rate(facts) if facts.rig.bounce.sizes else "static"
