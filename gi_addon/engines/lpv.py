@@ -488,8 +488,8 @@ class Propagation(Pass):
         table = ordinates(ordinate_count(facts))
         frame.upload("lpv.ordinates", table)
         filled = air(facts)
-        if filled is not None:
-            medium = filled.medium
+        if filled:
+            medium = filled[0].medium
             for key in ("main", "bounced") if planned.has("lpv.albedo") else ("main",):
                 frame.set(
                     frame.program(planned, key),

@@ -534,7 +534,7 @@ class RadialBlur(Volumetric):
     def defines(self, facts: Facts) -> dict[str, int]:
         # Without the camera's surfaces there is nothing in the way.
         maps = {"VOXEL_VISIBILITY": 0, "HAS_LIGHT_VIEWS": 0, "HAS_SHADOW_DEPTH": 0, "HAS_RSM_DEPTH": 0}
-        return {"RADIAL_BLUR": int(facts.visible), **maps}
+        return {**super().defines(facts), "RADIAL_BLUR": int(facts.visible), **maps}
 
     def prepare(self, frame: Frame, planned: Planned, program) -> None:
         if frame.subframe == 0:

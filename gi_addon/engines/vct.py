@@ -320,7 +320,7 @@ class VoxelVolumetric(Volumetric):
     def defines(self, facts: Facts) -> dict[str, int]:
         # Without shadows nothing blocks.
         return {
-            "RADIAL_BLUR": 0, "VOXEL_VISIBILITY": int(facts.settings.use_shadows and facts.triangles > 0),
+            **super().defines(facts), "VOXEL_VISIBILITY": int(facts.settings.use_shadows and facts.triangles > 0),
             "HAS_LIGHT_VIEWS": 0, "HAS_SHADOW_DEPTH": 0, "HAS_RSM_DEPTH": 0,
         }  # fmt: skip
 
