@@ -65,7 +65,7 @@ def _rows() -> tuple[Row, ...]:
         for samples, (hd, full_hd) in zip((100, 200, 300, 400), rates, strict=True):
             add("RSM", f"{resolution}², {samples} samples", {"rsm.resolution": resolution, "rsm.samples": samples}, hd, full_hd)
     for resolution, (hd, full_hd) in ((32, (196, 111)), (64, (94, 68))):
-        add("LPV", f"{resolution}³", {"lpv.resolution": resolution}, hd, full_hd)
+        add("LPV", f"{resolution}³", {"lpv.resolution": resolution, "lpv.cascades": "1"}, hd, full_hd)
     for continuous, rates in (
         (False, ((283, 145), (250, 128), (230, 109), (178, 89))),
         (True, ((214, 138), (214, 121), (170, 96), (74, 52))),

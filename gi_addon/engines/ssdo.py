@@ -25,9 +25,9 @@ from ..passes.direct_lighting import DirectLighting, TranslucentLighting
 from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint
 from ..passes.lights import LightList, ShadowMaps
 from ..passes.occupancy import Occupancy
+from ..passes.reflections import GLOSSY_RAY, GLOSSY_TRACED, reflection_sharing
 from ..passes.resolve import Resolve
 from ..passes.screen import (
-    INDIRECT_GLOSSY,
     LIGHT,
     LOBE,
     REFRACTING,
@@ -81,6 +81,8 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         ShadedScreen(),
         NearnessPyramid(),
         Reflections(),
+        *reflection_sharing(settings),
+        *reflection_sharing(settings, SOURCES_TRACED, REFLECTED_SOURCES, "SHARED_SOURCES"),
         TranslucentLayer(),
         TranslucentBack(),
         TranslucentLighting(),
@@ -405,19 +407,24 @@ class NearnessPyramid(Pass):
             width, height = max(1, width // 2), max(1, height // 2)
 
 
+SOURCES_TRACED = replace(
+    GLOSSY_TRACED, name="sources.traced", glsl="traced_sources",
+    when=lambda f: None if _sources_traced(f) else "the world and emissive surfaces shine through shadow maps",
+)  # fmt: skip
+REFLECTED_SOURCES = Texture("reflected.sources", "reflected_sources", "radiance that the glossy lobe reflects of the world and "
+                            "of emissive pixels, W/(m²·sr)", "rgba32f", _screen)  # fmt: skip
+
+
 class Reflections(Pass):
     """Glossy reflections of the screen."""
 
     title = "SSDO Reflections"
     reads = (
         "ssdo.planes", "ssdo.pyramid", "ssdo.shaded", "gbuffer.depth", "gbuffer.normal", *LOBE,
-        Optional("gbuffer.emission", ("reflected.sources",)),
+        Optional("gbuffer.emission", ("sources.traced",)),
     )  # fmt: skip
     writes = (
-        INDIRECT_GLOSSY,
-        Texture("reflected.sources", "reflected_sources", "radiance that it reflects of the world and of emissive pixels",
-                "rgba32f", _screen,
-                when=lambda f: None if _sources_traced(f) else "the world and emissive surfaces shine through shadow maps"),
+        GLOSSY_TRACED, SOURCES_TRACED, GLOSSY_RAY,
     )  # fmt: skip
     uniforms = (
         Uniform("ssdo_thickness", "float", "thickness of what the screen shows, as a share of its distance from the receiver"),
@@ -527,7 +534,7 @@ class RadialBlur(Volumetric):
     def defines(self, facts: Facts) -> dict[str, int]:
         # Without the camera's surfaces there is nothing in the way.
         maps = {"VOXEL_VISIBILITY": 0, "HAS_LIGHT_VIEWS": 0, "HAS_SHADOW_DEPTH": 0, "HAS_RSM_DEPTH": 0}
-        return {"RADIAL_BLUR": int(facts.visible), **maps}
+        return {**super().defines(facts), "RADIAL_BLUR": int(facts.visible), **maps}
 
     def prepare(self, frame: Frame, planned: Planned, program) -> None:
         if frame.subframe == 0:
