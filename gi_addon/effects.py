@@ -24,7 +24,7 @@ class Source:
 # Setting -> (graph resource that carries the effect, what is missing where only that one is there), the best first.
 RESOURCES: dict[str, tuple[tuple[str, str], ...]] = {
     "use_indirect_diffuse": (("indirect.diffuse", ""),),
-    "use_glossy": (("indirect.glossy", ""), ("direct.glossy", "highlights of lights only")),
+    "use_glossy": (("glossy.traced", ""), ("direct.glossy", "highlights of lights only")),
     "use_shadows": (("shadow.depth", ""),),
     "use_ao": (("ao", ""),),
     "use_translucency": (("transmission.indirect", ""), ("gbuffer.transmission", "what lies straight behind only")),

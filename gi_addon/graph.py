@@ -142,6 +142,10 @@ class Pass:
         """``static`` or ``subframe``."""
         return "subframe"
 
+    def place(self, facts: Facts) -> tuple:
+        """What of the camera the pass's output depends on; it is stale when that changes."""
+        return ()
+
     def absent(self, facts: Facts) -> str | None:
         """Why this scene has no use for this pass, or None."""
         return None

@@ -125,6 +125,7 @@ class Renderer:
         facts = gather_facts(
             scene, self.gpu.compiled, settings, size, outputs, subframes, self._world_map(scene),
             self._emitters(scene, stamps), self._find_focus(scene, stamps),
+            np.asarray(camera.world_from_view, "f8")[:3, 3],
         )
         facts.stamps = stamps
         key = (
@@ -183,7 +184,7 @@ class Renderer:
                 tuple(facts.stamps[kind] for kind in task.depends),
                 tuple(frame.settings.get(path) for path in task.settings),
                 tuple(w.name for w in planned.writes),
-                facts.rig.shadow.size, facts.rig.bounce.size,
+                facts.rig.shadow.size, facts.rig.bounce.size, task.place(facts),
             )  # fmt: skip
             last = self._static.get(task.title)
             planned.stale = last is None or last[0] != key or bool(rerun & {r.name for r in planned.reads})

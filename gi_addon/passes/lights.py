@@ -10,7 +10,8 @@ from ..facts import Facts
 from ..frame import Frame
 from ..gpu_types import LIGHT, LIGHT_VIEW
 from ..graph import Buffer, Optional, Pass, Planned, Texture, Uniform
-from ..scene import DIFFUSE, SHADOW
+from ..lights import LightRig
+from ..scene import DIFFUSE, SHADOW, blocker_set, receiver_set
 
 _VERTEX = "surface/surface_vert.glsl"
 _UNIFORMS = (
@@ -94,7 +95,9 @@ class RSMGeneration(Pass):
         Buffer("rsm.views", "rsm_views", "what the maps show", "LightView", LIGHT_VIEW,
                lambda f: max(1, len(f.rig.bounce.sizes))),
     )  # fmt: skip
-    uniforms = _UNIFORMS
+    uniforms = (
+        *_UNIFORMS, Uniform("light_reaches", "float", "1 where the light shines on what is drawn, 0 where it is only blocked"),
+    )  # fmt: skip
     depends = ("lights", "world", "transforms", "meshes", "materials")
     settings = ("rsm.resolution", "world.resolution", "world.samples")
 
@@ -126,9 +129,11 @@ def draw_light_maps(frame: Frame, planned: Planned, visibility: int, fragment: s
     sample = frame.light_sample(bounce=full)
     clips = [np.ascontiguousarray(clip.T, "f4") for clip in sample.clip_from_world]
     boxes = [None if full else facts.rig.beyond(i, int(view["light"])) for i, view in enumerate(sample.views)]
+    bits = frame.gpu.bits(visibility)
+    links = [_linked(facts.rig, int(view["light"]), bits, full) for view in sample.views]
     looks = [
-        (view.tobytes(), clip.tobytes(), None if box is None else box.tobytes())
-        for view, clip, box in zip(sample.views, clips, boxes, strict=True)
+        (view.tobytes(), clip.tobytes(), None if box is None else box.tobytes(), link)
+        for view, clip, box, link in zip(sample.views, clips, boxes, links, strict=True)
     ]
     geometry = (facts.stamps[kind] for kind in ("transforms", "meshes", "materials"))
     surfaces = (frame.targets(planned), tuple(maps.sizes), tuple(maps.corners), *geometry)
@@ -137,14 +142,14 @@ def draw_light_maps(frame: Frame, planned: Planned, visibility: int, fragment: s
     old = [] if clear else memory["looks"]
     due = [i for i, look in enumerate(looks) if i >= len(old) or old[i] != look]
     if due or clear:
-        tiles = [(sample.views[i], clips[i], boxes[i]) for i in due]
+        tiles = [(sample.views[i], clips[i], boxes[i], links[i]) for i in due]
         _draw_tiles(frame, planned, visibility, fragment, full=full, clear=clear, tiles=tiles)
     memory["surfaces"], memory["looks"] = surfaces, looks
     return bool(due) or clear
 
 
 def _draw_tiles(frame: Frame, planned: Planned, visibility: int, fragment: str, *, full: bool, clear: bool, tiles: list) -> None:
-    """Draw ``tiles`` (view, clip from world, box left out) of a light map; ``clear`` wipes the whole map before."""
+    """Draw ``tiles`` (view, clip from world, box left out, what of the scene) of a light map; ``clear`` wipes it before."""
     ctx = frame.gl.ctx
     fbo = frame.targets(planned)
     fbo.use()
@@ -164,7 +169,7 @@ def _draw_tiles(frame: Frame, planned: Planned, visibility: int, fragment: str, 
     }  # fmt: skip
     stages = {"vertex": _VERTEX, "fragment": fragment}
     programs = frame.gpu.programs(planned, stages, visibility, **options)
-    for view, clip_from_world, beyond in tiles:
+    for view, clip_from_world, beyond, linked in tiles:
         rect = tuple(int(v) for v in view["rect"])
         if not clear:
             fbo.clear(nothing, nothing, nothing, nothing, depth=1.0, viewport=rect)
@@ -176,4 +181,18 @@ def _draw_tiles(frame: Frame, planned: Planned, visibility: int, fragment: str, 
                 light_axis_ws=tuple(view["axis_z"]),
                 light_perspective=float(view["perspective"]),
             )
-        frame.gpu.draw(planned, stages, visibility, clip_from_world, beyond=beyond, **options)
+        for reaches, among in linked:
+            for program in programs if full else ():
+                frame.set(program, light_reaches=reaches)
+            frame.gpu.draw(planned, stages, visibility, clip_from_world, beyond=beyond, among=among, **options)
+
+
+def _linked(rig: LightRig, index: int, bits: tuple[int, ...], full: bool) -> list[tuple[float, tuple[int, ...] | None]]:
+    """(whether source ``index`` lights them, visibility bits) of what its map shows: what shades it and, in a bounce map
+    (``full``), what it lights."""
+    lit = tuple(b for b in bits if rig.lights_kind(index, receiver_set(b)))
+    dark = tuple(b for b in bits if rig.blocked_by(index, blocker_set(b)) and b not in lit)
+    if not full:
+        shades = tuple(b for b in bits if rig.blocked_by(index, blocker_set(b)))
+        return [(1.0, None if shades == bits else shades)]
+    return [(1.0, None if lit == bits else lit), *([(0.0, dark)] if dark else [])]
