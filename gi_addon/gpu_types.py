@@ -64,7 +64,7 @@ VPL = struct(
     ("position_ws", "f4", 3), ("area", "f4"),
     ("normal_ws", "f4", 3), ("light", "i4"),  # that lit it, in rsm.lights; −1 another virtual light
     ("flux", "f4", 3), ("anisotropy", "f4"),
-    ("clear_ws", "f4", 3), ("_pad0", "u4"),  # where rays to it end: clear of the cells of its own surface
+    ("clear_ws", "f4", 3), ("key", "u4"),  # where rays to it end: clear of the cells of its own surface; its place in order
 )  # fmt: skip
 
 

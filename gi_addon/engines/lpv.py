@@ -24,10 +24,10 @@ from ..passes.direct_lighting import DirectLighting, TranslucentLighting
 from ..passes.gbuffer import GBuffer, TranslucentBack, TranslucentLayer, TranslucentTint
 from ..passes.lights import LightList, RSMGeneration, ShadowMaps
 from ..passes.occupancy import CELL_UNIFORMS, Occupancy, set_cells
+from ..passes.reflections import GLOSSY_RAY, GLOSSY_TRACED, reflection_sharing
 from ..passes.resolve import Resolve
 from ..passes.screen import (
     INDIRECT_DIFFUSE,
-    INDIRECT_GLOSSY,
     LOBE,
     REFRACTING,
     TRANSMISSION_INDIRECT,
@@ -85,6 +85,7 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         Subsurface(),
         TranslucentLighting(),
         GlossyLighting(),
+        *reflection_sharing(settings),
         Refraction(),
         Volumetric(),
         Resolve(layers),
@@ -487,8 +488,8 @@ class Propagation(Pass):
         table = ordinates(ordinate_count(facts))
         frame.upload("lpv.ordinates", table)
         filled = air(facts)
-        if filled is not None:
-            medium = filled.medium
+        if filled:
+            medium = filled[0].medium
             for key in ("main", "bounced") if planned.has("lpv.albedo") else ("main",):
                 frame.set(
                     frame.program(planned, key),
@@ -636,8 +637,8 @@ class GlossyLighting(ScreenPass):
     figure = "LPV Lighting Computation"
     source = _RAY_SOURCE
     reads = (*_RAY_READS, *LOBE)
-    writes = (INDIRECT_GLOSSY,)
-    uniforms = (*_RAY_UNIFORMS, Uniform("glossy_rays", "int", "rays per pixel"))
+    writes = (GLOSSY_TRACED, GLOSSY_RAY)
+    uniforms = _RAY_UNIFORMS
     fragment = "engines/lpv/glossy_frag.glsl"
 
     def defines(self, facts: Facts) -> dict[str, int]:
@@ -647,7 +648,7 @@ class GlossyLighting(ScreenPass):
         return no_gloss(facts)
 
     def prepare(self, frame: Frame, planned: Planned, program) -> None:
-        _set_ray(frame, program, planned.facts, glossy_rays=planned.facts.settings.lpv.glossy_rays)
+        _set_ray(frame, program, planned.facts)
 
 
 class Refraction(ScreenPass):

@@ -56,6 +56,9 @@ class GBuffer(Pass):
     )  # fmt: skip
     uniforms = KIND_UNIFORMS
 
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return {"LAYER": 1}
+
     def absent(self, facts: Facts) -> str | None:
         return None if facts.visible else "the camera has no surface to see"
 

@@ -43,7 +43,8 @@ void main()
     none.normal_ws = vec3(0.0, 0.0, 1.0);
     none.flux = vec3(0.0);
     none.clear_ws = vec3(0.0);
-    vpls[i] = none;
+    none.key = 0u;
+    drawn_vpls[i] = none;
 
     float total = 0.0;
     for (int k = 0; k < view_count; ++k) {
@@ -144,5 +145,11 @@ void main()
     vpl.clear_ws = dot(to_light, t.normal_ws) > 0.0 ? cells_clear_along(t.position_ws, t.normal_ws, to_light)
                                                     : cells_clear(t.position_ws, t.normal_ws);
 #endif
-    vpls[i] = vpl;
+    // The light, the map of it, and the place in that along a curve that keeps neighbours together (G. M. Morton, 1966).
+    vpl.key = uint(index) << 22;
+    uvec2 at = uvec2((vec2(p) + 0.5 - v.rect.xy) / v.rect.zw * 2048.0);
+    for (int bit = 0; bit < 11; ++bit) {
+        vpl.key |= ((at.x >> bit & 1u) | (at.y >> bit & 1u) << 1) << (2 * bit);
+    }
+    drawn_vpls[i] = vpl;
 }
