@@ -36,7 +36,7 @@ LIGHT = struct(
     ("v_ws", "f4", 3), ("spot_scale", "f4"),      # spot: 1 / ((1 − cos) blend)
     ("center_ws", "f4", 3), ("spread_tan", "f4"),  # of the whole light; tan of half the spread (area)
     ("patch_radius", "f4"), ("spread_scale", "f4"), ("shape", "i4"), ("flags", "i4"),
-    ("soft_radius2", "f4"), ("diffuse", "f4"), ("glossy", "f4"),  # m², of a point's or spot's soft disc
+    ("soft_radius2", "f4"), ("diffuse", "f4"), ("glossy", "f4"), ("receivers", "u4"),  # m², of a soft disc; sets lit
     ("salt", "u4"),  # of its own sequences; the points of one world or of all emissive meshes share theirs
 )  # fmt: skip
 LIGHT_SUN, LIGHT_POINT, LIGHT_SPOT, LIGHT_AREA, LIGHT_WORLD, LIGHT_MESH = range(6)

@@ -26,7 +26,9 @@ class Preset:
 SHARES = {"PREVIEW": 0.25, "BALANCED": 1.0, "FINAL": 4.0}
 
 # What a preset of our own takes back of the paper's.
-_OURS: dict[str, Any] = {"rsm.visibility": "CELLS", "vct.shadow_cones": False, "vct.continuous_voxelization": False}
+_OURS: dict[str, Any] = {
+    "rsm.visibility": "CELLS", "lpv.cascades": "AUTO", "vct.shadow_cones": False, "vct.continuous_voxelization": False,
+}  # fmt: skip
 
 PRESETS: dict[str, Preset] = {
     "PAPER": Preset(
@@ -35,8 +37,8 @@ PRESETS: dict[str, Preset] = {
         # shadow cone, voxels made anew in each frame. SSDO: the smallest set, Mittring's occlusion, shadow maps. The paper names
         # neither its numbers of cones for diffuse light nor of iterations; LPV's iterations end when all light has arrived.
         {"samples": 1, "viewport_samples": 1, "bounces": 1, "gather_scale": 4, "ao.steps": 1, "rsm.resolution": 512,
-         "rsm.samples": 200, "rsm.visibility": "NONE", "lpv.resolution": 32, "vct.resolution": 128, "vct.cones": 12,
-         "vct.shadow_cones": True, "vct.continuous_voxelization": True, "ssdo.samples": 100},
+         "rsm.samples": 200, "rsm.visibility": "NONE", "lpv.resolution": 32, "lpv.cascades": "1", "vct.resolution": 128,
+         "vct.cones": 12, "vct.shadow_cones": True, "vct.continuous_voxelization": True, "ssdo.samples": 100},
     ),
     "PREVIEW": Preset(
         "Preview", "The fastest picture worth looking at: small maps, few samples, one bounce",
@@ -45,7 +47,7 @@ PRESETS: dict[str, Preset] = {
          "rsm.resolution": 256, "rsm.samples": 64, "lpv.resolution": 16, "vct.resolution": 32,
          "vct.cones": 12, "ssdo.samples": 64},
     ),
-    # Against a Cycles that bounces on, later bounces are worth more than anything else, and in the grids they cost next to nothing
+    # Against a Cycles that bounces on, later bounces are worth more than all else, and in grids they cost next to nothing
     # while the light stands still. Sub-frames average every other noise, so each takes fewer virtual lights the more there are.
     "BALANCED": Preset(
         "Balanced", "About the time of Cycles with one denoised sample: four sub-frames, three bounces",

@@ -13,6 +13,7 @@ from gi_addon.focus import Focus
 from gi_addon.gl import shared
 from gi_addon.gpu_types import LIGHT_WORLD
 from gi_addon.lights import Emitters, build_rig, spread_profile
+from gi_addon.materials.ies import mean_strength
 from gi_addon.renderer import Renderer
 from gi_addon.settings import Settings
 from gi_addon.world_map import WorldMap
@@ -221,3 +222,20 @@ def test_many_dim_lights_share_samples_without_losing_light(gl):
     result = make(scene, "Diffuse Indirect", samples=32, rsm__samples=16, resolution=(16, 9))
     exact = 0.5 * power / (4 * np.pi * 2.0**2) / np.pi
     assert result.passes["Diffuse Indirect"].mean() == pytest.approx(exact / (1 + 40 / (16 * 32)), rel=0.01)
+
+
+@pytest.mark.parametrize(("angles", "candela", "mean"), [
+    ("0 90 180", "1 1 1", 0.0707),       # Cycles, an emission of one such lamp over a sphere of 64 x 32 pixels
+    ("0 30 60 90 180", "1000 900 400 50 0", 16.90),
+])  # fmt: skip
+def test_a_photometric_lamp_sends_what_its_file_says_on_average(angles, candela, mean):
+    """Cycles' flux through a sphere around the lamp, over its power; it bends between the angles, which here are straight."""
+    count = len(angles.split())
+    file = f"IESNA:LM-63-2002\n[TEST] some lamp\nTILT=NONE\n1 1000 1 {count} 1 1 2 0 0 0\n1 1 100\n{angles}\n0\n{candela}\n"
+    assert mean_strength(file) == pytest.approx(mean, rel=0.05)
+    assert mean_strength(file.replace("1 1000 1", "1 1000 2")) == pytest.approx(2.0 * mean, rel=0.05)
+
+
+@pytest.mark.parametrize("text", ["", "TILT=NONE", "TILT=NONE\n1 1000 1 5 1", "TILT=INCLUDE\n1 2 3\nx"])
+def test_what_is_no_photometric_file_has_no_mean(text):
+    assert mean_strength(text) is None

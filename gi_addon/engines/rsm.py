@@ -20,10 +20,10 @@ from ..passes.direct_lighting import DirectLighting, TranslucentLighting
 from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint, gather_size
 from ..passes.lights import LightList, RSMGeneration, ShadowMaps
 from ..passes.occupancy import CELL_UNIFORMS, Occupancy, set_cells
+from ..passes.reflections import GLOSSY_RAY, GLOSSY_TRACED, reflection_sharing
 from ..passes.resolve import Resolve
 from ..passes.screen import (
     INDIRECT_DIFFUSE,
-    INDIRECT_GLOSSY,
     LOBE,
     REFRACTING,
     TRANSMISSION_INDIRECT,
@@ -65,6 +65,7 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         Subsurface(),
         TranslucentLighting(),
         GlossyReflections(),
+        *reflection_sharing(settings),
         Refraction(),
         Volumetric(),
         Resolve(layers),
@@ -109,7 +110,7 @@ def vpl_count(facts: Facts) -> int:
 def air_count(facts: Facts) -> int:
     """Points of the air that scatter light onto surfaces: half as many as first-bounce lights, being smoother."""
     found = air(facts)
-    return max(1, facts.settings.rsm.samples // 2) if found is not None and any(found.medium.scattering) else 0
+    return max(1, facts.settings.rsm.samples // 2) if any(any(d.medium.scattering) for d in found) else 0
 
 
 class RSMFlux(Pass):
@@ -129,6 +130,7 @@ class RSMFlux(Pass):
     }
     depends = ("lights", "world", "transforms", "meshes", "materials")
     settings = ("use_volumetric", "volume.density")
+    repeats = True
 
     def rate(self, facts: Facts) -> str:
         return RSMGeneration().rate(facts)
@@ -184,8 +186,6 @@ class RSMSamplingPattern(Pass):
         Uniform("bounce_first", "int", "the first light of the bounce before"),
         Uniform("point_first", "int", "the sub-frame's first surface point"),
         Uniform("point_count", "int", "surface points of a bounce"),
-        Uniform("medium_scattering", "vec3", "share of light scattered per metre"),
-        Uniform("medium_anisotropy", "float", "mean cosine of the scattering angle"),
         *MEDIUM_UNIFORMS,
         *CELL_UNIFORMS,
     )
@@ -227,15 +227,13 @@ class RSMSamplingPattern(Pass):
     @staticmethod
     def _air(frame: Frame, planned: Planned) -> None:
         program, facts = frame.program(planned, "air"), planned.facts
-        medium, count = air(facts).medium, air_count(facts)
+        count = air_count(facts)
         set_medium(frame, program, facts)
         frame.set(
             program,
             point_count=count,
             vpl_count=vpl_count(facts) - count,
             view_count=len(facts.rig.bounce.sizes),
-            medium_scattering=tuple(float(v) for v in medium.scattering),
-            medium_anisotropy=float(medium.anisotropy),
         )
         frame.compute(planned, program, (count,), (64,))
 
@@ -341,7 +339,7 @@ class GlossyReflections(ScreenPass):
     title = "RSM Glossy Reflections"
     figure = "Ray Casting in RSM"
     reads = (*_RAY_READS, *LOBE)
-    writes = (INDIRECT_GLOSSY,)
+    writes = (GLOSSY_TRACED, GLOSSY_RAY)
     uniforms = _RAY_UNIFORMS
     fragment = "engines/rsm/glossy_frag.glsl"
 
