@@ -8,6 +8,7 @@ own; with one sub-frame every light is its centre.
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -120,6 +121,8 @@ class Source:
     # World and meshes: this source draws points `index` of every `count` per sub-frame.
     index: int = 0
     count: int = 1
+    # Of the sequences that are the light's own, whatever else shines.
+    salt: int = 0
     # A second shadow map, of the focus alone, where a backdrop would leave the first one coarse.
     near: bool = False
 
@@ -265,6 +268,7 @@ class LightRig:
         out["views"] = source.views
         out["flags"] = LIGHT_FLAG_BOUNCE
         out["diffuse"] = out["glossy"] = 1.0
+        out["salt"] = source.salt
         out["receivers"] = EVERY_SET
         light = source.light
         if source.kind == LIGHT_WORLD:
@@ -472,6 +476,7 @@ def build_rig(
 
     for source in sources:
         source.near = focus.narrow and source.kind in (LIGHT_SUN, LIGHT_WORLD)
+        source.salt = source.seed if source.light is None else zlib.crc32(source.light.name.encode())
     radius = 0.5 * float(np.linalg.norm(focus.region[1] - focus.region[0]))
     coarser = _coarser_maps({s.seed: _power(s.light, radius) for s in sources if s.light is not None})
 

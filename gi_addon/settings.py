@@ -151,6 +151,11 @@ class RSMSettings:
         200, "Samples", "Virtual point lights gathered per pixel and sub-frame", low=1, high=4096,
         higher="less blotchy near surfaces", lower="faster",
     )  # fmt: skip
+    own_samples: bool = _setting(
+        False, "Samples of Each Light", "Every light has as many virtual lights of its own, whatever else shines: lights then "
+        "add up exactly",
+        higher="each light as fine as if it shone alone", lower="faster where many lights shine: they share the samples by flux",
+    )  # fmt: skip
     visibility: str = _setting(
         "CELLS", "Visibility", "Whether virtual lights are blocked by objects",
         choices=(("NONE", "None", "They shine through everything, as in 2005; near contacts are dimmed by ambient occlusion"),

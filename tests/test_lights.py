@@ -208,3 +208,34 @@ def test_a_photometric_lamp_sends_what_its_file_says_on_average(angles, candela,
 @pytest.mark.parametrize("text", ["", "TILT=NONE", "TILT=NONE\n1 1000 1 5 1", "TILT=INCLUDE\n1 2 3\nx"])
 def test_what_is_no_photometric_file_has_no_mean(text):
     assert mean_strength(text) is None
+
+
+def test_a_block_of_two_to_the_n_texels_is_of_one_tile():
+    """Coarser levels of an atlas's sums are then each tile's own: 2^n blocks at multiples of 2^n."""
+    sizes = [100, 512, 33, 64, 300]
+    corners, _ = atlas.pack(sizes, power_of_two=True)
+    blocks = set()
+    for (x, y), size in zip(corners, sizes, strict=True):
+        block = 1 << (size - 1).bit_length()
+        assert x % block == y % block == 0
+        covered = {(i, j) for i in range(x, x + block, 16) for j in range(y, y + block, 16)}
+        assert not covered & blocks
+        blocks |= covered
+
+
+def test_many_dim_lights_share_samples_without_losing_light(gl):
+    """40 lamps and 16 samples: a lamp has one in some sub-frames only, and all of its light in the mean. Each lamp sees the
+    whole sphere, so of L lamps N samples in each of S sub-frames are discs of L/(NS) of it, and form factors K A/(1 + K A)
+    are less than K A by 1 + L/(NS) (gather_lib.glsl)."""
+    rng = np.random.default_rng(4)
+    b = scenes.SceneBuilder()
+    b.add(scenes.sphere(2.0, 48, 24, inward=True), scenes.diffuse((0.5,) * 3))
+    for i in range(40):
+        light = scenes.point_light(rng.uniform(-0.3, 0.3, 3), 1.0 + i % 3)
+        light.name = f"Lamp {i}"
+        b.light(light)
+    scene = b.build(scenes.perspective((0, -1, 0), (0, 1, 0), 1.0))
+    power = sum(float(light.emission[0]) for light in scene.lights)
+    result = make(scene, "Diffuse Indirect", samples=32, rsm__samples=16, resolution=(16, 9))
+    exact = 0.5 * power / (4 * np.pi * 2.0**2) / np.pi
+    assert result.passes["Diffuse Indirect"].mean() == pytest.approx(exact / (1 + 40 / (16 * 32)), rel=0.01)

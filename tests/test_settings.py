@@ -19,7 +19,7 @@ OTHER = {
     "viewport_samples": None, "bounces": 0, "pixel_filter": "BLACKMAN_HARRIS", "filter_width": 3.0,
     "shadows.resolution": 64, "shadows.softness": 6.0, "ao.samples": 1, "ao.steps": 1, "ao.distance": 0.3,
     "ao.contact": 0.005, "world.samples": 1, "world.aimed": False, "world.rays": 4, "world.resolution": 64,
-    "rsm.resolution": 32, "rsm.samples": 7,
+    "rsm.resolution": 32, "rsm.samples": 7, "rsm.own_samples": True,
     "volume.samples": 2, "volume.density": 0.2, "volume.anisotropy": 0.5, "rsm.visibility": "NONE",
     "rsm.visibility_resolution": 32,
     "gather_scale": 1, "motion_steps": None,

@@ -640,13 +640,15 @@ def linearity(suite: Suite) -> Finding:
         difference = np.abs(a[name][..., :3] * 1e3 - b[name][..., :3]).max() / max(b[name][..., :3].max(), 1e-12)
         out.quantities.append(at_most(f"{name}, power × 1000", difference, 1e-3))
 
-    def box(*lights):
+    def box(*lights, **values):
         scene = scenes.cornell(blocks=False)
         scene.lights = list(lights)
-        return suite.render(scene, "Diffuse Direct", "Diffuse Indirect", samples=64 if suite.full else 8, use_ao=False).passes
+        samples = 64 if suite.full else 8
+        return suite.render(scene, "Diffuse Direct", "Diffuse Indirect", samples=samples, use_ao=False, **values).passes
 
     one, two = scenes.point_light((-0.4, 0, 1.5), 40.0), scenes.spot_light((0.3, 0, 1.9), (0, 0, 0), 90.0, 1.4, 0.3)
-    both, first, second = box(one, two), box(one), box(two)
+    own = {suite.traits.own.replace(".", "__"): True} if suite.traits.own else {}
+    both, first, second = box(one, two, **own), box(one, **own), box(two, **own)
     total = first["Diffuse Direct"] + second["Diffuse Direct"]
     out.quantities.append(at_most("two lights, direct, max", np.abs(both["Diffuse Direct"] - total).max() / total.max(), 1e-3))
     indirect = first["Diffuse Indirect"].mean() + second["Diffuse Indirect"].mean()
@@ -655,8 +657,9 @@ def linearity(suite: Suite) -> Finding:
     )
     for title, passes in (("one light", first), ("the other", second), ("both", both)):
         out.pictures[f"{title}, indirect"] = passes["Diffuse Indirect"][..., :3] / max(both["Diffuse Indirect"].max(), 1e-12)
-    if suite.traits.set == "rsm.samples":
-        out.nature = "both lights share one set of virtual lights: each alone draws another, equal up to its noise"
+    if own:
+        shared = box(one, two)["Diffuse Indirect"].mean()
+        out.quantities.append(reported(f"the same without {suite.traits.own}", abs(shared / max(indirect, 1e-12) - 1.0)))
     return out
 
 

@@ -8,6 +8,8 @@ light is gathered at low resolution and interpolated where surfaces agree.
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 from ..facts import Facts
 from ..frame import Frame
 from ..gpu_types import LIGHT_MESH, VPL
@@ -75,9 +77,18 @@ def _gather_defines(facts: Facts, *, always: bool = False) -> dict[str, int]:
     return {"GATHER_SCALE": facts.settings.gather_scale, "MESH_LIGHTS": int(lamps), **medium_defines(facts), **untested}
 
 
+def first_count(facts: Facts) -> int:
+    """Virtual point lights of the first bounce."""
+    rsm = facts.settings.rsm
+    # As the shader tells lights apart (engines/rsm/vpls_comp.glsl).
+    salts = [s.salt for s, first in zip(facts.rig.sources, facts.rig.bounce.first, strict=True) if first >= 0]
+    lights = sum(a != b for a, b in pairwise((None, *salts)))
+    return rsm.samples * (max(lights, 1) if rsm.own_samples else 1)
+
+
 def vpl_count(facts: Facts) -> int:
     """Virtual point lights of all bounces, and those in the air."""
-    return facts.settings.rsm.samples + max(facts.settings.bounces - 1, 0) * points_per_subframe(facts) + air_count(facts)
+    return first_count(facts) + max(facts.settings.bounces - 1, 0) * points_per_subframe(facts) + air_count(facts)
 
 
 def air_count(facts: Facts) -> int:
@@ -152,7 +163,7 @@ class RSMSamplingPattern(Pass):
     uniforms = (
         Uniform("vpl_count", "int", "how many to draw; for the next bounce and the air: where the last ones end"),
         Uniform("view_count", "int", "views in the list"),
-        Uniform("levels", "int", "levels of the flux pyramid above the texels"),
+        Uniform("own_samples", "int", "virtual lights that each light has for itself; 0: they share all by flux"),
         Uniform("bounce_first", "int", "the first light of the bounce before"),
         Uniform("point_first", "int", "the sub-frame's first surface point"),
         Uniform("point_count", "int", "surface points of a bounce"),
@@ -166,8 +177,8 @@ class RSMSamplingPattern(Pass):
     }
 
     def __init__(self, settings: Settings) -> None:
-        if settings.bounces > 1:
-            self.reads = _tested((*type(self).reads, "surface.points"), settings)
+        points = ("surface.points",) if settings.bounces > 1 else ()
+        self.reads = _tested((*type(self).reads, *points), settings)
 
     def defines(self, facts: Facts) -> dict[str, int]:
         return _gather_defines(facts)
@@ -175,13 +186,14 @@ class RSMSamplingPattern(Pass):
     def run(self, frame: Frame, planned: Planned) -> None:
         program = frame.program(planned)
         facts = planned.facts
-        count = facts.settings.rsm.samples
+        rsm, count = facts.settings.rsm, first_count(facts)
         set_medium(frame, program, facts)
+        set_cells(frame, program, facts)
         frame.set(
             program,
             vpl_count=count,
             view_count=len(facts.rig.bounce.sizes),
-            levels=max(facts.rig.bounce.size).bit_length() - 1,
+            own_samples=rsm.samples if rsm.own_samples else 0,
         )
         frame.compute(planned, program, (count,), (64,))
         if facts.settings.bounces > 1:

@@ -56,5 +56,6 @@ void main()
         vpl.area = PI * pow(0.2387324 * beam * weight / float(view.subframes), 2.0 / 3.0); // 3/4π
     }
 #endif
+    vpl.clear_ws = vpl.position_ws;
     vpls[vpl_count + i] = vpl;
 }

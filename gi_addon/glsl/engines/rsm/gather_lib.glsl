@@ -40,12 +40,11 @@ struct Gathered {
 // Every `stride`-th virtual light from `first` on, each standing for `stride` of them, its disc as many times as large. A
 // light's own disc is its share among those of all sub-frames, which a pixel's mean over them has; where the sum is not
 // averaged so, `alone` is their number, and the disc the sub-frame's.
-Gathered gather_some_vpls(vec3 position_ws, vec3 n, vec3 ng, int first, int stride, float alone)
+//
+// Rays are tested from `start_ws` on, the point clear of the cells of its own surface.
+Gathered gather_some_vpls_from(vec3 start_ws, vec3 position_ws, vec3 n, vec3 ng, int first, int stride, float alone)
 {
     Gathered g = Gathered(vec3(0.0), vec4(0.0));
-#if HAS_OCCUPANCY
-    vec3 start_ws = cells_clear(position_ws, ng);
-#endif
     for (int i = first; i < vpl_count; i += stride) {
         Vpl vpl = vpls[i];
         vec3 d = vpl.position_ws - position_ws;
@@ -64,7 +63,7 @@ Gathered gather_some_vpls(vec3 position_ws, vec3 n, vec3 ng, int first, int stri
         }
 #endif
 #if HAS_OCCUPANCY
-        if (cells_block(start_ws, in_air ? vpl.position_ws : cells_clear(vpl.position_ws, vpl.normal_ws))) {
+        if (cells_block(start_ws, vpl.clear_ws)) {
             continue;
         }
 #endif
@@ -91,4 +90,21 @@ Gathered gather_some_vpls(vec3 position_ws, vec3 n, vec3 ng, int first, int stri
     return g;
 }
 
-Gathered gather_vpls(vec3 position_ws, vec3 n, vec3 ng) { return gather_some_vpls(position_ws, n, ng, 0, 1, 1.0); }
+Gathered gather_some_vpls(vec3 position_ws, vec3 n, vec3 ng, int first, int stride, float alone)
+{
+    vec3 start_ws = position_ws;
+#if HAS_OCCUPANCY
+    start_ws = cells_clear(position_ws, ng);
+#endif
+    return gather_some_vpls_from(start_ws, position_ws, n, ng, first, stride, alone);
+}
+
+// All of them at a point that the eye sees, `to_eye` from it.
+Gathered gather_vpls(vec3 position_ws, vec3 n, vec3 ng, vec3 to_eye)
+{
+    vec3 start_ws = position_ws;
+#if HAS_OCCUPANCY
+    start_ws = cells_clear_along(position_ws, ng, to_eye);
+#endif
+    return gather_some_vpls_from(start_ws, position_ws, n, ng, 0, 1, 1.0);
+}
