@@ -13,13 +13,15 @@ from ..frame import Frame
 from ..graph import Optional, Pass, Planned, Texture, Uniform
 from ..passes.brdf_tables import BRDFTables
 from ..passes.direct_lighting import DirectLighting, TranslucentLighting
-from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint
+from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint, gather_size
 from ..passes.lights import LightList, RSMGeneration, ShadowMaps
 from ..passes.occupancy import Occupancy
 from ..passes.resolve import Resolve
 from ..passes.screen import (
+    DIRECTION,
     INDIRECT_DIFFUSE,
     INDIRECT_GLOSSY,
+    LIGHT,
     LOBE,
     REFRACTING,
     TRANSMISSION_INDIRECT,
@@ -29,7 +31,6 @@ from ..passes.screen import (
     no_gloss,
     no_indirect,
 )
-from ..passes.smoothing import BlockSmoothing, raw_gather
 from ..passes.subsurface import Subsurface, SubsurfaceBack
 from ..passes.volumetric import MEDIUM_UNIFORMS, Volumetric, medium_defines, set_medium
 from ..passes.voxels import GRID_UNIFORMS, VoxelGrid, Voxelisation, voxel_atlas, voxel_grid
@@ -55,8 +56,8 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         TranslucentTint(),
         GBufferMips(),
         VoxelAO(),
-        InterpolatedIndirect(),
-        BlockSmoothing("indirect.low", "Voxel Interpolated Indirect Lighting (smoothing)"),
+        ConeHits(),
+        SharedHits(),
         IndirectLighting(),
         GlossyCones(),
         *([ShadowCones()] if settings.vct.shadow_cones else []),
@@ -183,22 +184,56 @@ def _set_cones(frame: Frame, program, facts: Facts) -> None:
     )  # fmt: skip
 
 
-class InterpolatedIndirect(ScreenPass):
-    """Indirect light at one pixel per block."""
+_BLOCKS = ("gbuffer.low_depth", "gbuffer.low_normal", "gbuffer.low_pixel")
+_HITS = ("vct.hits", "vct.nearness")
+
+
+def _hits_defines(facts: Facts) -> dict[str, int]:
+    return {"GATHER_SCALE": facts.settings.gather_scale, "CONES": facts.settings.vct.cones}
+
+
+class ConeHits(Pass):
+    """Where the cones of one pixel per block end."""
 
     title = "Voxel Interpolated Indirect Lighting Computation"
-    reads = (*_VOLUMES, "gbuffer.low_depth", "gbuffer.low_normal", "gbuffer.low_pixel")
-    writes = raw_gather("indirect.low")
+    figure = "Voxel Interpolated Indirect Lighting Computation"
+    reads = (*_VOLUMES, *_BLOCKS)
+    writes = (
+        Texture("vct.hits", "cone_hits", "halves: offset to what a cone of the block met first, cells; radiance that it brings, "
+                "W/(m²·sr)", "rgba32ui", lambda f: (*gather_size(f), f.settings.vct.cones), layers=True, scratch=True),
+        Texture("vct.nearness", "cone_nearness", "mean of 1/distance of what the block's cones met, 1/cells", "r32f", gather_size,
+                scratch=True),
+    )  # fmt: skip
     uniforms = _CONE_UNIFORMS
-    fragment = "engines/vct/gather_low_frag.glsl"
+    shaders = {"main": {"compute": "engines/vct/gather_low_comp.glsl"}}
 
     def defines(self, facts: Facts) -> dict[str, int]:
-        return {"GATHER_SCALE": facts.settings.gather_scale}
+        return _hits_defines(facts)
 
     def absent(self, facts: Facts) -> str | None:
-        if facts.settings.gather_scale == 1:
-            return "every pixel gathers for itself"
         return no_indirect(facts) or _unlit(facts)
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        program = frame.program(planned)
+        _set_cones(frame, program, planned.facts)
+        frame.compute(planned, program, gather_size(planned.facts))
+
+
+class SharedHits(ScreenPass):
+    """Indirect light at one pixel per block, by the hits of all blocks around."""
+
+    title = "Voxel Interpolated Indirect Lighting (shared cones)"
+    figure = "Voxel Interpolated Indirect Lighting Computation"
+    reads = (*_VOLUMES, *_BLOCKS, *_HITS)
+    writes = (
+        Texture("indirect.low", "low_indirect", LIGHT, "rgba32f", gather_size, scratch=True),
+        Texture("indirect.low.direction", "low_direction", DIRECTION, "rgba32f", gather_size, scratch=True),
+    )  # fmt: skip
+    uniforms = _CONE_UNIFORMS
+    fragment = "engines/vct/share_frag.glsl"
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return _hits_defines(facts)
 
     def prepare(self, frame: Frame, planned: Planned, program) -> None:
         _set_cones(frame, program, planned.facts)
@@ -210,15 +245,14 @@ class IndirectLighting(ScreenPass):
     title = "Voxel Lighting Computation"
     figure = "Voxel Lighting Computation"
     reads = (
-        *_VOLUMES, "gbuffer.depth", "gbuffer.normal", Optional("gbuffer.low_depth"), Optional("gbuffer.low_normal"),
-        Optional("gbuffer.low_pixel"), Optional("indirect.low"), Optional("indirect.low.direction"),
+        *_VOLUMES, "gbuffer.depth", "gbuffer.normal", *_BLOCKS, *_HITS, "indirect.low", "indirect.low.direction",
     )  # fmt: skip
     writes = (INDIRECT_DIFFUSE,)
     uniforms = _CONE_UNIFORMS
     fragment = "engines/vct/lighting_frag.glsl"
 
     def defines(self, facts: Facts) -> dict[str, int]:
-        return {"GATHER_SCALE": facts.settings.gather_scale}
+        return _hits_defines(facts)
 
     def absent(self, facts: Facts) -> str | None:
         return no_indirect(facts) or _unlit(facts)

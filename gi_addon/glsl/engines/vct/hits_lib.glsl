@@ -1,0 +1,49 @@
+// Where the cones of a point end, to be kept for its neighbours. Included after diffuse_lib.glsl, with CONES defined.
+
+struct Hit {
+    vec3 offset;    // from the point, cells
+    vec3 normal;    // of the side that was met
+    vec3 radiance;  // 0 where nothing was met
+};
+
+uvec4 pack_hit(Hit hit)
+{
+    return uvec4(packHalf2x16(hit.offset.xy), packHalf2x16(vec2(hit.offset.z, hit.radiance.x)), packHalf2x16(hit.radiance.yz),
+                 packUnorm2x16(octahedral_encode(hit.normal)));
+}
+
+Hit unpack_hit(uvec4 texel)
+{
+    vec2 zr = unpackHalf2x16(texel.y);
+    return Hit(vec3(unpackHalf2x16(texel.x), zr.x), octahedral_decode(unpackUnorm2x16(texel.w)), vec3(zr.y, unpackHalf2x16(texel.z)));
+}
+
+// A point that gathers, and where its own cones ended.
+struct Gatherer {
+    vec3 at;         // cells
+    vec3 n;
+    vec3 ng;
+    float nearness;  // mean of 1/distance of what it sees, 1/cells
+};
+
+// Traces run `run` of cones from a point.
+Gatherer trace_hits(vec3 position_ws, vec3 n, vec3 ng, uint run, out uvec4 hits[CONES])
+{
+    Gatherer g = Gatherer((position_ws - grid_low) / grid_cell, n, ng, 0.0);
+    Grid grid = voxel_grid();
+    mat3 frame = frame_from_normal(n);
+    Cone cone = surface_cone(grid, position_ws, ng, n, set_spread(), 1e30);
+    for (int i = 0; i < CONES; ++i) {
+        cone.direction = frame * cone_direction(run + uint(i));
+        hits[i] = uvec4(0u);
+        if (dot(cone.direction, ng) > 0.0) { // else into the triangle
+            ConeResult result = trace_cone(voxel_radiance, voxel_back, voxel_sheets, voxel_kinds, grid, cone);
+            if (result.first.t < 1e30) {
+                float t = max(result.first.t, LIFT);
+                hits[i] = pack_hit(Hit(cone.direction * t, result.first.normal, result.radiance));
+                g.nearness += 1.0 / (t * float(CONES));
+            }
+        }
+    }
+    return g;
+}

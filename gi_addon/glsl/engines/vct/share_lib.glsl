@@ -1,0 +1,83 @@
+// What a point takes of the cones of the blocks around it. Included after passes/gather_receiver.glsl and diffuse_lib.glsl, where
+// `cone_hits` and `cone_nearness` are declared.
+//
+// Neighbours' cones end on surfaces that this point sees too, in another direction and at another distance. A
+// cone of block i ends at y with density g_i/π per area, g_i = cosθ_i cosθ_y/r_i²; what y sends here is L g_c/π per area. So its
+// light counts here by g_c/g_i: neighbours add no blur, but for what one point sees and the other does not (E. Veach and L. Guibas, SIGGRAPH 1995; P. Bekaert, M. Sbert and J. Halton, "Accelerating
+// Path Tracing by Re-Using Paths", EGWR 2002). Weights are the balance heuristic's, pair by pair (B. Bitterli, "Correlations and
+// Reuse for Fast and Accurate Physically Based Light Transport", 2021, §9.1): of K neighbours each shares 1/K of this
+// point's cones, so that a cone of its own counts by Σ_i (g_c/K)/(g_i + g_c/K)/K, a neighbour's by g_c/(g_i + g_c/K)/K, which never
+// exceeds a cone's full weight. Both add up to one for every y.
+//
+// That a point sees what its neighbour does holds as far as the surfaces lie that it sees: no farther off than 1 over the mean of
+// 1/distance (G. Ward et al., "A Ray Tracing Solution for Diffuse Interreflection", SIGGRAPH 1988).
+
+#include "engines/vct/hits_lib.glsl"
+
+// cosθ cosθ_y/r² of a surface of normal `normal` at `offset`.
+float facing(Gatherer g, vec3 offset, vec3 normal)
+{
+    float square = max(dot(offset, offset), 1e-9);
+    float cosines = max(dot(offset, g.n), 0.0) * max(-dot(offset, normal), 0.0);
+    return dot(offset, g.ng) > 0.0 ? cosines / sqr(square) : 0.0;
+}
+
+// Whether there is a block that sees what `here` does, its surface off the plane by no more than `off_plane` (m).
+bool sees_alike(Gatherer here, ivec2 block, vec3 position_ws, float off_plane, out Gatherer there)
+{
+    if (any(lessThan(block, ivec2(0))) || any(greaterThanEqual(block, textureSize(low_depth, 0)))) {
+        return false;
+    }
+    Receiver r = gather_receiver(block);
+    there = Gatherer((r.position_ws - grid_low) / grid_cell, r.n, r.ng, texelFetch(cone_nearness, block, 0).r);
+    return on_surface(r, position_ws, here.ng, off_plane) &&
+           distance(there.at, here.at) * max(here.nearness, there.nearness) <= 1.0;
+}
+
+void add_hit(inout Gathered sum, Gatherer g, Hit hit, float weight)
+{
+    sum.radiance += hit.radiance * (weight / float(CONES));
+    sum.direction += directional(normalize(hit.offset), g.n, hit.radiance * weight);
+}
+
+// E/π at a point by its own cones, and those of SIDE × SIDE blocks around `block`; not of `block` itself if the point is its own.
+Gathered shared_light(Gatherer here, uvec4 own[CONES], vec3 position_ws, float off_plane, ivec2 block, bool is_block)
+{
+    Gatherer there;
+    float k = 0.0;
+    for (int i = 0; i < SIDE * SIDE; ++i) {
+        ivec2 step_ = ivec2(i % SIDE, i / SIDE) - SIDE / 2;
+        bool other = !is_block || step_ != ivec2(0);
+        k += other && sees_alike(here, block + step_, position_ws, off_plane, there) ? 1.0 : 0.0;
+    }
+    Gathered sum = Gathered(vec3(0.0), vec4(0.0));
+    for (int j = 0; j < (k > 0.0 ? 0 : CONES); ++j) {
+        Hit hit = unpack_hit(own[j]);
+        if (max3(hit.radiance) > 0.0) {
+            add_hit(sum, here, hit, 1.0);
+        }
+    }
+    for (int i = 0; i < (k > 0.0 ? SIDE * SIDE : 0); ++i) {
+        ivec2 step_ = ivec2(i % SIDE, i / SIDE) - SIDE / 2;
+        bool other = !is_block || step_ != ivec2(0);
+        if (!other || !sees_alike(here, block + step_, position_ws, off_plane, there)) {
+            continue;
+        }
+        for (int j = 0; j < CONES; ++j) {
+            Hit hit = unpack_hit(own[j]);
+            if (max3(hit.radiance) > 0.0) {
+                float g_here = facing(here, hit.offset, hit.normal);
+                float g_there = facing(there, here.at + hit.offset - there.at, hit.normal);
+                add_hit(sum, here, hit, g_here / max(k * g_there + g_here, 1e-30) / k);
+            }
+            hit = unpack_hit(texelFetch(cone_hits, ivec3(block + step_, j), 0));
+            if (max3(hit.radiance) > 0.0) {
+                float g_there = facing(there, hit.offset, hit.normal);
+                hit.offset += there.at - here.at;
+                float g_here = facing(here, hit.offset, hit.normal);
+                add_hit(sum, here, hit, g_here / max(k * g_there + g_here, 1e-30));
+            }
+        }
+    }
+    return sum;
+}
