@@ -86,7 +86,7 @@ class RadianceInjection(Pass):
     title = "Voxel Radiance Injection"
     figure = "Voxel Radiance Injection, Voxel Anisotropic Mipmap Generation"
     reads = (
-        "voxels.sheets", "voxels.kinds", "voxels.albedo", Optional("voxels.emission"), Optional("voxels.lamps"),
+        "voxels.sheets", "voxels.kinds", "voxels.albedo", Optional("voxels.extents", ("vct.bounce",)), Optional("voxels.emission"), Optional("voxels.lamps"),
         Optional("rsm.depth"), Optional("rsm.albedo"), Optional("rsm.normal"), Optional("rsm.lights"), Optional("rsm.views"),
     )  # fmt: skip
     writes = (
@@ -167,7 +167,7 @@ def build_mips(frame: Frame, planned: Planned, grid: VoxelGrid) -> None:
 
 
 # What cones read.
-_VOLUMES = ("vct.radiance", "vct.back", "voxels.sheets", "voxels.kinds")
+_VOLUMES = ("vct.radiance", "vct.back", "voxels.sheets", "voxels.extents", "voxels.kinds")
 _CONE_UNIFORMS = (
     *GRID_UNIFORMS,
     Uniform("grid_levels", "float", "mips above the cells"),

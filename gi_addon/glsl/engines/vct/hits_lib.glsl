@@ -37,7 +37,7 @@ Gatherer trace_hits(vec3 position_ws, vec3 n, vec3 ng, uint run, out uvec4 hits[
         cone.direction = frame * cone_direction(run + uint(i));
         hits[i] = uvec4(0u);
         if (dot(cone.direction, ng) > 0.0) { // else into the triangle
-            ConeResult result = trace_cone(voxel_radiance, voxel_back, voxel_sheets, voxel_kinds, grid, cone);
+            ConeResult result = trace_cone(voxel_radiance, voxel_back, voxel_sheets, voxel_extents, voxel_kinds, grid, cone);
             if (result.first.t < 1e30) {
                 float t = max(result.first.t, LIFT);
                 hits[i] = pack_hit(Hit(cone.direction * t, result.first.normal, result.radiance));

@@ -8,6 +8,9 @@
 #include "passes/interpolate.glsl"
 #include "engines/vct/share_lib.glsl"
 
+// Pixels that gather for themselves take of the blocks next to theirs only: of SIDE × SIDE costs as much again as their own cones.
+const int NEXT = 3;
+
 void main()
 {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
@@ -28,7 +31,7 @@ void main()
         uvec4 own[CONES];
         Gatherer here = trace_hits(position_ws, n, ng, cone_run(pixel), own);
         ivec2 block = (pixel + gather_grid_offset()) / GATHER_SCALE;
-        radiance = shared_light(here, own, position_ws, float(GATHER_SCALE) * pixel_width(depth), block, false).radiance;
+        radiance = shared_light(here, own, position_ws, float(GATHER_SCALE) * pixel_width(depth), block, NEXT, false).radiance;
     }
     indirect_diffuse = vec4(radiance, 1.0);
 #endif

@@ -40,13 +40,13 @@ void add_hit(inout Gathered sum, Gatherer g, Hit hit, float weight)
     sum.direction += directional(normalize(hit.offset), g.n, hit.radiance * weight);
 }
 
-// E/π at a point by its own cones, and those of SIDE × SIDE blocks around `block`; not of `block` itself if the point is its own.
-Gathered shared_light(Gatherer here, uvec4 own[CONES], vec3 position_ws, float off_plane, ivec2 block, bool is_block)
+// E/π at a point by its own cones, and those of `side` × `side` blocks around `block`; not of `block` itself if the point is its own.
+Gathered shared_light(Gatherer here, uvec4 own[CONES], vec3 position_ws, float off_plane, ivec2 block, int side, bool is_block)
 {
     Gatherer there;
     float k = 0.0;
-    for (int i = 0; i < SIDE * SIDE; ++i) {
-        ivec2 step_ = ivec2(i % SIDE, i / SIDE) - SIDE / 2;
+    for (int i = 0; i < side * side; ++i) {
+        ivec2 step_ = ivec2(i % side, i / side) - side / 2;
         bool other = !is_block || step_ != ivec2(0);
         k += other && sees_alike(here, block + step_, position_ws, off_plane, there) ? 1.0 : 0.0;
     }
@@ -57,8 +57,8 @@ Gathered shared_light(Gatherer here, uvec4 own[CONES], vec3 position_ws, float o
             add_hit(sum, here, hit, 1.0);
         }
     }
-    for (int i = 0; i < (k > 0.0 ? SIDE * SIDE : 0); ++i) {
-        ivec2 step_ = ivec2(i % SIDE, i / SIDE) - SIDE / 2;
+    for (int i = 0; i < (k > 0.0 ? side * side : 0); ++i) {
+        ivec2 step_ = ivec2(i % side, i / side) - side / 2;
         bool other = !is_block || step_ != ivec2(0);
         if (!other || !sees_alike(here, block + step_, position_ws, off_plane, there)) {
             continue;
