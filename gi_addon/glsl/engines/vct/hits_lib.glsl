@@ -2,8 +2,8 @@
 
 struct Hit {
     vec3 offset;    // from the point, cells
-    vec3 normal;    // of the side that was met
-    vec3 radiance;  // 0 where nothing was met
+    vec3 normal;    // of the side that was met, or of the grid's where nothing was
+    vec3 radiance;  // 0 from there
 };
 
 uvec4 pack_hit(Hit hit)
@@ -26,6 +26,16 @@ struct Gatherer {
     float nearness;  // mean of 1/distance of what it sees, 1/cells
 };
 
+// Of the grid's side where the cone leaves it, inwards.
+vec3 box_normal(Cone cone, Grid grid)
+{
+    vec3 d = mix(cone.direction, vec3(1e-9), lessThan(abs(cone.direction), vec3(1e-9)));
+    vec3 far = max(-cone.start / d, (grid.size - cone.start) / d);
+    float first = min(far.x, min(far.y, far.z));
+    int axis = far.x == first ? 0 : far.y == first ? 1 : 2;
+    return -sign(d[axis]) * axis_vector(axis);
+}
+
 // Traces run `run` of cones from a point.
 Gatherer trace_hits(vec3 position_ws, vec3 n, vec3 ng, uint run, out uvec4 hits[CONES])
 {
@@ -38,11 +48,11 @@ Gatherer trace_hits(vec3 position_ws, vec3 n, vec3 ng, uint run, out uvec4 hits[
         hits[i] = uvec4(0u);
         if (dot(cone.direction, ng) > 0.0) { // else into the triangle
             ConeResult result = trace_cone(voxel_radiance, voxel_back, voxel_sheets, voxel_extents, voxel_kinds, grid, cone);
-            if (result.first.t < 1e30) {
-                float t = max(result.first.t, LIFT);
-                hits[i] = pack_hit(Hit(cone.direction * t, result.first.normal, result.radiance));
-                g.nearness += 1.0 / (t * float(CONES));
-            }
+            bool met = result.first.t < 1e30;
+            float t = max(met ? result.first.t : cone_end(cone, grid), LIFT);
+            vec3 normal = met ? result.first.normal : box_normal(cone, grid);
+            hits[i] = pack_hit(Hit(cone.direction * t, normal, result.radiance));
+            g.nearness += met ? 1.0 / (t * float(CONES)) : 0.0;
         }
     }
     return g;

@@ -17,7 +17,10 @@
 // cosθ cosθ_y/r² of a surface of normal `normal` at `offset`.
 float facing(Gatherer g, vec3 offset, vec3 normal)
 {
-    float square = max(dot(offset, offset), 1e-9);
+    float square = dot(offset, offset);
+    if (square == 0.0) {
+        return 1.0; // not traced, into the triangle: of each point as many
+    }
     float cosines = max(dot(offset, g.n), 0.0) * max(-dot(offset, normal), 0.0);
     return dot(offset, g.ng) > 0.0 ? cosines / sqr(square) : 0.0;
 }
@@ -34,13 +37,19 @@ bool sees_alike(Gatherer here, ivec2 block, vec3 position_ws, float off_plane, o
            distance(there.at, here.at) * max(here.nearness, there.nearness) <= 1.0;
 }
 
-void add_hit(inout Gathered sum, Gatherer g, Hit hit, float weight)
+// Adds a cone's light and its weight.
+void add_hit(inout Gathered sum, inout float weights, Gatherer g, Hit hit, float weight)
 {
-    sum.radiance += hit.radiance * (weight / float(CONES));
-    sum.direction += directional(normalize(hit.offset), g.n, hit.radiance * weight);
+    weights += weight;
+    if (max3(hit.radiance) > 0.0) {
+        sum.radiance += hit.radiance * weight;
+        sum.direction += directional(normalize(hit.offset), g.n, hit.radiance * weight);
+    }
 }
 
 // E/π at a point by its own cones, and those of `side` × `side` blocks around `block`; not of `block` itself if the point is its own.
+// All weights add up to the number of cones but for their noise, which their sum takes out: what meets nothing counts as the side of
+// the grid where it leaves.
 Gathered shared_light(Gatherer here, uvec4 own[CONES], vec3 position_ws, float off_plane, ivec2 block, int side, bool is_block)
 {
     Gatherer there;
@@ -51,11 +60,9 @@ Gathered shared_light(Gatherer here, uvec4 own[CONES], vec3 position_ws, float o
         k += other && sees_alike(here, block + step_, position_ws, off_plane, there) ? 1.0 : 0.0;
     }
     Gathered sum = Gathered(vec3(0.0), vec4(0.0));
+    float weights = 0.0;
     for (int j = 0; j < (k > 0.0 ? 0 : CONES); ++j) {
-        Hit hit = unpack_hit(own[j]);
-        if (max3(hit.radiance) > 0.0) {
-            add_hit(sum, here, hit, 1.0);
-        }
+        add_hit(sum, weights, here, unpack_hit(own[j]), 1.0);
     }
     for (int i = 0; i < (k > 0.0 ? side * side : 0); ++i) {
         ivec2 step_ = ivec2(i % side, i / side) - side / 2;
@@ -65,19 +72,18 @@ Gathered shared_light(Gatherer here, uvec4 own[CONES], vec3 position_ws, float o
         }
         for (int j = 0; j < CONES; ++j) {
             Hit hit = unpack_hit(own[j]);
-            if (max3(hit.radiance) > 0.0) {
-                float g_here = facing(here, hit.offset, hit.normal);
-                float g_there = facing(there, here.at + hit.offset - there.at, hit.normal);
-                add_hit(sum, here, hit, g_here / max(k * g_there + g_here, 1e-30) / k);
-            }
+            float g_here = facing(here, hit.offset, hit.normal);
+            float g_there = facing(there, hit.offset == vec3(0.0) ? hit.offset : here.at + hit.offset - there.at, hit.normal);
+            add_hit(sum, weights, here, hit, g_here / max(k * g_there + g_here, 1e-30) / k);
             hit = unpack_hit(texelFetch(cone_hits, ivec3(block + step_, j), 0));
-            if (max3(hit.radiance) > 0.0) {
-                float g_there = facing(there, hit.offset, hit.normal);
+            g_there = facing(there, hit.offset, hit.normal);
+            if (hit.offset != vec3(0.0)) {
                 hit.offset += there.at - here.at;
-                float g_here = facing(here, hit.offset, hit.normal);
-                add_hit(sum, here, hit, g_here / max(k * g_there + g_here, 1e-30));
             }
+            g_here = facing(here, hit.offset, hit.normal);
+            add_hit(sum, weights, here, hit, g_here / max(k * g_there + g_here, 1e-30));
         }
     }
+    sum.radiance /= max(weights, 1e-6);
     return sum;
 }
