@@ -185,7 +185,6 @@ def _set_cones(frame: Frame, program, facts: Facts) -> None:
 
 
 _BLOCKS = ("gbuffer.low_depth", "gbuffer.low_normal", "gbuffer.low_pixel")
-_HITS = ("vct.hits", "vct.nearness")
 
 
 def _hits_defines(facts: Facts) -> dict[str, int]:
@@ -201,8 +200,6 @@ class ConeHits(Pass):
     writes = (
         Texture("vct.hits", "cone_hits", "halves: offset to what a cone of the block met first, cells; radiance that it brings, "
                 "W/(m²·sr)", "rgba32ui", lambda f: (*gather_size(f), f.settings.vct.cones), layers=True, scratch=True),
-        Texture("vct.nearness", "cone_nearness", "mean of 1/distance of what the block's cones met, 1/cells", "r32f", gather_size,
-                scratch=True),
     )  # fmt: skip
     uniforms = _CONE_UNIFORMS
     shaders = {"main": {"compute": "engines/vct/gather_low_comp.glsl"}}
@@ -224,7 +221,7 @@ class SharedHits(ScreenPass):
 
     title = "Voxel Interpolated Indirect Lighting (shared cones)"
     figure = "Voxel Interpolated Indirect Lighting Computation"
-    reads = (*_VOLUMES, *_BLOCKS, *_HITS)
+    reads = (*_VOLUMES, *_BLOCKS, "vct.hits")
     writes = (
         Texture("indirect.low", "low_indirect", LIGHT, "rgba32f", gather_size, scratch=True),
         Texture("indirect.low.direction", "low_direction", DIRECTION, "rgba32f", gather_size, scratch=True),
@@ -245,7 +242,7 @@ class IndirectLighting(ScreenPass):
     title = "Voxel Lighting Computation"
     figure = "Voxel Lighting Computation"
     reads = (
-        *_VOLUMES, "gbuffer.depth", "gbuffer.normal", *_BLOCKS, *_HITS, "indirect.low", "indirect.low.direction",
+        *_VOLUMES, "gbuffer.depth", "gbuffer.normal", *_BLOCKS, "vct.hits", "indirect.low", "indirect.low.direction",
     )  # fmt: skip
     writes = (INDIRECT_DIFFUSE,)
     uniforms = _CONE_UNIFORMS

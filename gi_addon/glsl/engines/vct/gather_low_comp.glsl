@@ -17,12 +17,10 @@ void main()
     }
     Receiver r = gather_receiver(block);
     uvec4 hits[CONES];
-    Gatherer g;
     if (r.exists) {
-        g = trace_hits(r.position_ws, r.n, r.ng, cone_run(block), hits);
+        trace_hits(r.position_ws, r.n, r.ng, cone_run(block), hits);
     }
     for (int i = 0; i < CONES; ++i) {
         imageStore(cone_hits, ivec3(block, i), r.exists ? hits[i] : uvec4(0u));
     }
-    imageStore(cone_nearness, block, vec4(r.exists ? g.nearness : 0.0));
 }

@@ -18,13 +18,14 @@ Hit unpack_hit(uvec4 texel)
     return Hit(vec3(unpackHalf2x16(texel.x), zr.x), octahedral_decode(unpackUnorm2x16(texel.w)), vec3(zr.y, unpackHalf2x16(texel.z)));
 }
 
-// A point that gathers, and where its own cones ended.
+// A point that gathers.
 struct Gatherer {
-    vec3 at;         // cells
+    vec3 at;  // cells
     vec3 n;
     vec3 ng;
-    float nearness;  // mean of 1/distance of what it sees, 1/cells
 };
+
+Gatherer gatherer(vec3 position_ws, vec3 n, vec3 ng) { return Gatherer((position_ws - grid_low) / grid_cell, n, ng); }
 
 // Of the grid's side where the cone leaves it, inwards.
 vec3 box_normal(Cone cone, Grid grid)
@@ -37,9 +38,8 @@ vec3 box_normal(Cone cone, Grid grid)
 }
 
 // Traces run `run` of cones from a point.
-Gatherer trace_hits(vec3 position_ws, vec3 n, vec3 ng, uint run, out uvec4 hits[CONES])
+void trace_hits(vec3 position_ws, vec3 n, vec3 ng, uint run, out uvec4 hits[CONES])
 {
-    Gatherer g = Gatherer((position_ws - grid_low) / grid_cell, n, ng, 0.0);
     Grid grid = voxel_grid();
     mat3 frame = frame_from_normal(n);
     Cone cone = surface_cone(grid, position_ws, ng, n, set_spread(), 1e30);
@@ -52,8 +52,6 @@ Gatherer trace_hits(vec3 position_ws, vec3 n, vec3 ng, uint run, out uvec4 hits[
             float t = max(met ? result.first.t : cone_end(cone, grid), LIFT);
             vec3 normal = met ? result.first.normal : box_normal(cone, grid);
             hits[i] = pack_hit(Hit(cone.direction * t, normal, result.radiance));
-            g.nearness += met ? 1.0 / (t * float(CONES)) : 0.0;
         }
     }
-    return g;
 }

@@ -29,7 +29,8 @@ void main()
     vec3 radiance;
     if (!interpolated_indirect(position_ws, n, ng, depth, radiance)) {
         uvec4 own[CONES];
-        Gatherer here = trace_hits(position_ws, n, ng, cone_run(pixel), own);
+        trace_hits(position_ws, n, ng, cone_run(pixel), own);
+        Gatherer here = gatherer(position_ws, n, ng);
         ivec2 block = (pixel + gather_grid_offset()) / GATHER_SCALE;
         radiance = shared_light(here, own, position_ws, float(GATHER_SCALE) * pixel_width(depth), block, NEXT, false).radiance;
     }

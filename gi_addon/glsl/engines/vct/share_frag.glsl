@@ -20,7 +20,7 @@ void main()
     for (int i = 0; i < CONES; ++i) {
         own[i] = texelFetch(cone_hits, ivec3(block, i), 0);
     }
-    Gatherer here = Gatherer((r.position_ws - grid_low) / grid_cell, r.n, r.ng, texelFetch(cone_nearness, block, 0).r);
+    Gatherer here = gatherer(r.position_ws, r.n, r.ng);
     Gathered g = shared_light(here, own, r.position_ws, float(GATHER_SCALE) * pixel_width(r.depth), block, SIDE, true);
     low_indirect = vec4(g.radiance, 1.0);
     low_direction = g.direction;

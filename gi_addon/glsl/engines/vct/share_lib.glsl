@@ -1,5 +1,5 @@
 // What a point takes of the cones of the blocks around it. Included after passes/gather_receiver.glsl and diffuse_lib.glsl, where
-// `cone_hits` and `cone_nearness` are declared.
+// `cone_hits` is declared.
 //
 // Neighbours' cones end on surfaces that this point sees too, in another direction and at another distance. A
 // cone of block i ends at y with density g_i/π per area, g_i = cosθ_i cosθ_y/r_i²; what y sends here is L g_c/π per area. So its
@@ -9,8 +9,7 @@
 // point's cones, so that a cone of its own counts by Σ_i (g_c/K)/(g_i + g_c/K)/K, a neighbour's by g_c/(g_i + g_c/K)/K, which never
 // exceeds a cone's full weight. Both add up to one for every y.
 //
-// That a point sees what its neighbour does holds as far as the surfaces lie that it sees: no farther off than 1 over the mean of
-// 1/distance (G. Ward et al., "A Ray Tracing Solution for Diffuse Interreflection", SIGGRAPH 1988).
+// That a point sees what its neighbour does is taken for granted where both lie on one surface and nothing stands between them.
 
 #include "engines/vct/hits_lib.glsl"
 
@@ -25,16 +24,24 @@ float facing(Gatherer g, vec3 offset, vec3 normal)
     return dot(offset, g.ng) > 0.0 ? cosines / sqr(square) : 0.0;
 }
 
-// Whether there is a block that sees what `here` does, its surface off the plane by no more than `off_plane` (m).
-bool sees_alike(Gatherer here, ivec2 block, vec3 position_ws, float off_plane, out Gatherer there)
+// The block's point, if there is one and it is on the same surface as `here`, off the plane by no more than `off_plane` (m).
+bool on_same_surface(Gatherer here, ivec2 block, vec3 position_ws, float off_plane, out Gatherer there)
 {
     if (any(lessThan(block, ivec2(0))) || any(greaterThanEqual(block, textureSize(low_depth, 0)))) {
         return false;
     }
     Receiver r = gather_receiver(block);
-    there = Gatherer((r.position_ws - grid_low) / grid_cell, r.n, r.ng, texelFetch(cone_nearness, block, 0).r);
-    return on_surface(r, position_ws, here.ng, off_plane) &&
-           distance(there.at, here.at) * max(here.nearness, there.nearness) <= 1.0;
+    there = gatherer(r.position_ws, r.n, r.ng);
+    return on_surface(r, position_ws, here.ng, off_plane);
+}
+
+// Whether nothing stands between two points of a surface: seen from as far above it as a surface may bend away within two cells.
+bool see_each_other(Gatherer here, Gatherer there)
+{
+    vec3 way = there.at - here.at;
+    float reach = length(way);
+    Cone cone = Cone(here.at + OWN_HEIGHT * here.ng, way / max(reach, 1e-6), 0.0, reach, 0.0);
+    return trace_open(voxel_sheets, voxel_extents, voxel_kinds, voxel_grid(), cone) > 0.5;
 }
 
 // Adds a cone's light and its weight.
@@ -53,12 +60,14 @@ void add_hit(inout Gathered sum, inout float weights, Gatherer g, Hit hit, float
 Gathered shared_light(Gatherer here, uvec4 own[CONES], vec3 position_ws, float off_plane, ivec2 block, int side, bool is_block)
 {
     Gatherer there;
-    float k = 0.0;
+    uint shared_ = 0u; // a bit for each block around
     for (int i = 0; i < side * side; ++i) {
         ivec2 step_ = ivec2(i % side, i / side) - side / 2;
-        bool other = !is_block || step_ != ivec2(0);
-        k += other && sees_alike(here, block + step_, position_ws, off_plane, there) ? 1.0 : 0.0;
+        if ((!is_block || step_ != ivec2(0)) && on_same_surface(here, block + step_, position_ws, off_plane, there)) {
+            shared_ |= see_each_other(here, there) ? 1u << i : 0u;
+        }
     }
+    float k = float(bitCount(shared_));
     Gathered sum = Gathered(vec3(0.0), vec4(0.0));
     float weights = 0.0;
     for (int j = 0; j < (k > 0.0 ? 0 : CONES); ++j) {
@@ -66,10 +75,10 @@ Gathered shared_light(Gatherer here, uvec4 own[CONES], vec3 position_ws, float o
     }
     for (int i = 0; i < (k > 0.0 ? side * side : 0); ++i) {
         ivec2 step_ = ivec2(i % side, i / side) - side / 2;
-        bool other = !is_block || step_ != ivec2(0);
-        if (!other || !sees_alike(here, block + step_, position_ws, off_plane, there)) {
+        if ((shared_ >> i & 1u) == 0u) {
             continue;
         }
+        on_same_surface(here, block + step_, position_ws, off_plane, there);
         for (int j = 0; j < CONES; ++j) {
             Hit hit = unpack_hit(own[j]);
             float g_here = facing(here, hit.offset, hit.normal);
