@@ -16,7 +16,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from . import __version__
-from .cli_measure import bench_command, certify_command, report_command, stability_command
+from .cli_measure import bench_command, certify_command, report_command, stability_command, unseen_command
 from .gl import GLError
 from .outputs import OUTPUTS
 from .renderer import RenderError, inspect, render
@@ -161,6 +161,8 @@ def inspect_command(
             settings = properties.read(bscene)
     plan = inspect(plain, settings, names, resolution=resolution)
     click.echo(plan.graph_text() if dot else plan.text())
+    if not dot and settings.technique == "SSDO" and settings.use_indirect_diffuse:
+        unseen_command(plain, settings)
     _notes(plain.notes)
 
 
@@ -168,7 +170,7 @@ def inspect_command(
 @click.argument("scenes", nargs=-1, type=click.Path(path_type=Path))
 @_scene_options
 @click.option("--techniques", help="Techniques separated by commas, or 'all'.")
-@click.option("--sweep", type=click.Choice(("none", "samples", "quick", "full")),
+@click.option("--sweep", type=click.Choice(("none", "presets", "samples", "quick", "full")),
               help="How many settings of each technique to try.")
 @click.option("--peers", default="", help="Rivals in the same run: cycles, eevee, or both separated by a comma.")
 @click.option("--blender", metavar="PROGRAM",

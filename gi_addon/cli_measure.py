@@ -10,6 +10,10 @@ import click
 from rich.console import Console
 from rich.table import Table
 
+from .gl import GLError
+from .scene import Scene
+from .settings import Settings
+
 console = Console(stderr=True)
 
 
@@ -233,7 +237,7 @@ def report_command(
                     progress=lambda text, label=label: console.print(f"{label}: {text}", style="dim", highlight=False),
                 )
         console.print(f"{label}: scores")
-        record = study.scene_record(label, key, size, samples, runs, references, plain.triangle_count())
+        record = study.scene_record(label, key, size, samples, runs, references, plain.triangle_count(), base)
         record["peers"] = {m: v for m, v in versions.items() if any(r.candidate.method == m for r in runs)}
         measured.append(report.Measured(record, runs, references))
         if scene != scenes[-1]:  # what is measured can be looked at while the others are
@@ -277,3 +281,14 @@ def certify_command(scene: Path, bscene, reference_samples: int) -> None:
         result = certify(plain, settings, size, {kind: halves}, progress=status.update)
     click.echo(f"{scene.name}, {size[0]} × {size[1]} pixels, {plain.triangle_count()} triangles")
     click.echo(result.text())
+
+
+def unseen_command(scene: Scene, settings: Settings) -> None:
+    """Print how much of the bounced light the screen does not know; a line instead where there is no OpenGL to look with."""
+    from .compare.visible_light import light_unseen
+
+    click.echo("")
+    try:
+        click.echo("\n".join(light_unseen(scene, settings)))
+    except GLError as error:
+        click.echo(f"lit surfaces off screen: not measured ({error})")

@@ -24,13 +24,47 @@ class Source:
 # Setting -> (graph resource that carries the effect, what is missing where only that one is there), the best first.
 RESOURCES: dict[str, tuple[tuple[str, str], ...]] = {
     "use_indirect_diffuse": (("indirect.diffuse", ""),),
-    "use_glossy": (("indirect.glossy", ""), ("direct.glossy", "highlights of lights only")),
+    "use_glossy": (("glossy.traced", ""), ("direct.glossy", "highlights of lights only")),
     "use_shadows": (("shadow.depth", ""),),
     "use_ao": (("ao", ""),),
     "use_translucency": (("transmission.indirect", ""), ("gbuffer.transmission", "what lies straight behind only")),
     "use_volumetric": (("volume.light", ""),),
     "use_area_lights": (("lights", ""),),
 }
+
+
+# What must be for a setting, or all of a group, to change the picture: settings that are on, or have that value.
+NEEDS: dict[str, tuple[str, ...]] = {
+    "gather_scale": ("use_indirect_diffuse",),
+    "shadows": ("use_shadows",),
+    "ao": ("use_ao",),
+    "world.aimed": ("use_shadows",),
+    "world.rays": ("use_shadows",),
+    "volume": ("use_volumetric",),
+    "volume.anisotropy": ("volume.density",),
+    "lpv.glossy_rays": ("use_glossy",),
+    "vct.shadow_cones": ("use_shadows",),
+    "vct.emissive_voxels": ("use_area_lights",),
+    "ssdo.occlusion": ("use_ao",),
+    "ssdo.shadows": ("use_shadows",),
+    "ssdo.contact": ("use_shadows", "ssdo.shadows=CONTACT"),
+    "ssdo.volumetric": ("use_volumetric",),
+}
+
+
+def needs_of(path: str) -> tuple[str, ...]:
+    """What must be for the setting ``path`` to have an effect, as in NEEDS."""
+    return (*NEEDS.get(path.rpartition(".")[0], ()), *NEEDS.get(path, ()))
+
+
+def in_effect(path: str, settings: Settings) -> bool:
+    """Whether the setting ``path`` changes anything beside the others in ``settings``."""
+    for need in needs_of(path):
+        name, _, value = need.partition("=")
+        found = settings.get(name)
+        if found != value if value else not found:
+            return False
+    return True
 
 
 def source_of(technique: str, effect: str) -> Source:

@@ -11,12 +11,24 @@ from .focus import Focus, find_focus
 from .lights import Emitters, LightRig, build_rig
 from .materials import CompiledGraph, Medium, mean_medium
 from .outputs import film_layers
-from .scene import CAMERA, Scene
+from .scene import CAMERA, CATCHER, Mesh, Scene
 from .settings import Settings
 from .world_map import WorldMap
 
+# Volume objects that count; every ray is cut with each.
+_MOST_DOMAINS = 8
 # Points of emissive meshes per sub-frame, each with a full cube of maps.
 _EMITTER_SAMPLES = 2
+
+
+@dataclass(frozen=True)
+class Domain:
+    """What a homogeneous ``medium`` fills: everywhere, or what ``unit_from_world`` (4, 4) takes into the cube from −1 to 1 or,
+    for a ``ball``, into the unit ball."""
+
+    medium: Medium
+    unit_from_world: np.ndarray | None = None
+    ball: bool = False
 
 
 @dataclass
@@ -41,11 +53,13 @@ class Facts:
     world_black: bool
     ao_distance: float
     world_visible: bool = True  # to the camera
-    medium: Medium | None = None  # that fills the world, or the box
-    medium_box: np.ndarray | None = None  # (2, 3) world space, m; None: everywhere
+    catchers: bool = False  # the camera sees objects of which only the shadow on them shows
+    media: tuple[Domain, ...] = ()  # of the world and of objects that are volumes
     margin: int = 0  # px drawn beyond each side of the picture
     stamps: dict[str, str] = field(default_factory=dict)
     emitters: Emitters = field(default_factory=Emitters.none)  # all of them, sampled as lights or not
+    focus: Focus = field(default_factory=lambda: Focus.on(np.zeros((2, 3))))
+    eye: np.ndarray = field(default_factory=lambda: np.zeros(3))  # the camera's place, world space, m
 
     @property
     def glowing_voxels(self) -> bool:
@@ -92,10 +106,14 @@ def gather_facts(
     world: WorldMap | None,
     emitters: Emitters,
     focus: Focus | None = None,
+    eye: np.ndarray | None = None,
 ) -> Facts:
-    """Look at everything once. ``resolution`` is the picture's; ``focus`` is found where it is not given."""
+    """Look at everything once. ``resolution`` is the picture's; ``focus`` is found where it is not given, ``eye`` is then the
+    scene's own camera's."""
     margin = round(settings.ssdo.margin * max(resolution)) if settings.technique == "SSDO" else 0
     focus = focus or find_focus(scene)
+    if eye is None:
+        eye = np.zeros(3) if scene.camera is None else np.asarray(scene.camera.world_from_view, "f8")[:3, 3]
     s = settings
     seen = scene.instances.visibility & CAMERA if len(scene.instances) else np.zeros(0, "u4")
     used = {m for i, ms in enumerate(scene.instances.materials) if seen[i] for m in ms}
@@ -114,13 +132,11 @@ def gather_facts(
         shadow_resolution=s.shadows.resolution, bounce_resolution=s.rsm.resolution,
         world_resolution=s.world.resolution,
     )  # fmt: skip
-    medium, medium_box = mean_medium(scene.world.graph, scene.images), None
-    domains = _domains(scene)
-    if medium is None and domains:
-        medium, medium_box = domains[0]
-    ignored = len(domains) - (medium_box is not None)
-    if ignored:
-        rig.notes.append(f"{ignored} of {len(domains)} volume objects are left out: one medium can fill the scene")
+    medium, domains = mean_medium(scene.world.graph, scene.images), _domains(scene)
+    if len(domains) > _MOST_DOMAINS:
+        rig.notes.append(f"{len(domains) - _MOST_DOMAINS} of {len(domains)} volume objects are left out: {_MOST_DOMAINS} count, "
+                         "the largest")  # fmt: skip
+    media = (*([Domain(medium)] if medium is not None else []), *domains[:_MOST_DOMAINS])
     return Facts(
         settings=s,
         resolution=(resolution[0] + 2 * margin, resolution[1] + 2 * margin),
@@ -141,25 +157,39 @@ def gather_facts(
         world_black=world is None or world.black,
         ao_distance=s.ao.distance or scene.world.ao_distance,
         world_visible=scene.world.visible_camera,
-        medium=medium,
-        medium_box=medium_box,
+        catchers=bool((scene.instances.visibility[seen > 0] & CATCHER).any()),
+        media=media,
         stamps=scene.stamps(),
         emitters=emitters,
+        focus=focus,
+        eye=eye,
     )
 
 
-def _domains(scene: Scene) -> list[tuple[Medium, np.ndarray]]:
-    """(medium, box in world space) of the objects that are a volume and nothing else, the largest first. A domain counts as
-    the box around it, which a cube along the axes is."""
+def _domains(scene: Scene) -> list[Domain]:
+    """Of the objects that are a volume and nothing else, the largest first. Each counts as the box or the ellipsoid in its own
+    bounds, whichever is nearer to the volume of its mesh."""
     found = []
     inst = scene.instances
     media = [mean_medium(m.graph, scene.images) if m.graph.surface is None else None for m in scene.materials]
     for i in range(len(inst)):
         medium = next((media[m] for m in inst.materials[i] if media[m] is not None), None)
-        if medium is None or scene.meshes[inst.mesh[i]].empty or not np.isfinite(inst.matrix[i]).all():
+        mesh = scene.meshes[inst.mesh[i]]
+        if medium is None or mesh.empty or not np.isfinite(inst.matrix[i]).all():
             continue
-        low, high = scene.meshes[inst.mesh[i]].bounds
-        corners = np.array([[(low, high)[k >> axis & 1][axis] for axis in range(3)] for k in range(8)])
-        corners = corners @ inst.matrix[i, :3, :3].T + inst.matrix[i, :3, 3]
-        found.append((medium, np.stack([corners.min(axis=0), corners.max(axis=0)])))
-    return sorted(found, key=lambda d: -float(np.prod(d[1][1] - d[1][0])))
+        low, high = mesh.bounds
+        unit = np.diag([*((high - low) / 2.0), 1.0])
+        unit[:3, 3] = (low + high) / 2.0
+        world_from_unit = inst.matrix[i] @ unit
+        size = abs(float(np.linalg.det(world_from_unit[:3, :3])))
+        if size <= 1e-12 * float(np.abs(world_from_unit[:3, :3]).max()) ** 3:
+            continue  # flat: nothing is inside
+        ball = _enclosed(mesh) < 0.5 * (1.0 + np.pi / 6.0) * float(np.prod(high - low))
+        found.append((size, Domain(medium, np.linalg.inv(world_from_unit), ball)))
+    return [domain for _, domain in sorted(found, key=lambda f: -f[0])]
+
+
+def _enclosed(mesh: Mesh) -> float:
+    """Volume that a closed mesh encloses, m³ in its own space: the sum of the tetrahedra to a point."""
+    a, b, c = np.moveaxis(mesh.positions[mesh.triangles].astype("f8") - mesh.bounds.mean(axis=0), 1, 0)
+    return abs(float(np.einsum("ij,ij->", a, np.cross(b, c)))) / 6.0

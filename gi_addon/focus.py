@@ -9,7 +9,7 @@ receiver along it, and ½ h/√(h² + R²) for one across it: that share of the 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -34,11 +34,13 @@ _MOST_TRIANGLES = 300_000
 @dataclass(frozen=True)
 class Focus:
     """World-space boxes (2, 3) in m: ``core`` holds all but the backdrop, ``region`` what grids and bounce maps cover,
-    ``whole`` everything. All three are the same where there is no backdrop."""
+    ``whole`` everything. All three are the same where there is no backdrop. ``free_path``: how far light flies in the core from
+    surface to surface, m; 0 where that has no meaning."""
 
     core: np.ndarray
     region: np.ndarray
     whole: np.ndarray
+    free_path: float = 0.0
 
     @staticmethod
     def on(bounds: np.ndarray) -> Focus:
@@ -51,6 +53,36 @@ class Focus:
 
 
 def find_focus(scene: Scene) -> Focus:
+    """The scene's focus, and how dense what it holds stands."""
+    focus = _without_backdrop(scene)
+    return replace(focus, free_path=_free_path(scene, focus.core))
+
+
+def _free_path(scene: Scene, core: np.ndarray) -> float:
+    """Mean length of chords in the box ``core`` (2, 3) between the surfaces inside and its sides, m: 4 V/S (A. Cauchy), S the
+    larger of the surfaces' area and the box's own, which most rooms' walls are."""
+    extent = np.maximum(core[1] - core[0], 0.0)
+    volume = float(np.prod(extent))
+    if not np.isfinite(volume) or volume <= 0.0:
+        return 0.0
+    sides = 2.0 * float(extent[0] * extent[1] + extent[1] * extent[2] + extent[2] * extent[0])
+    boxes = scene.instance_bounds()
+    inside = ((boxes >= core[0]) & (boxes <= core[1])).all(axis=(1, 2)) if len(boxes) else np.zeros(0, bool)
+    placed: dict[int, list[np.ndarray]] = {}
+    for i in np.flatnonzero(inside):
+        placed.setdefault(int(scene.instances.mesh[i]), []).append(scene.instances.matrix[i][:3, :3])
+    surface = 0.0
+    for mesh, turns in placed.items():
+        corners = scene.meshes[mesh].positions.astype("f8")[scene.meshes[mesh].triangles]
+        twice = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        own = float(np.linalg.norm(twice, axis=1).sum()) / 2.0
+        for turn in turns:
+            # Exact where an instance is scaled alike along all axes.
+            surface += own * abs(float(np.linalg.det(turn))) ** (2.0 / 3.0)
+    return 4.0 * volume / max(surface, sides)
+
+
+def _without_backdrop(scene: Scene) -> Focus:
     """Leave out the largest instances one by one, as long as each dwarfs what remains and does not enclose it."""
     whole = scene.bounds()
     boxes = scene.instance_bounds()

@@ -44,18 +44,22 @@ _OBJECT_SPACE = ("_os", "generated", "object_", "point.object", "world_from_obje
 class DrawList:
     """Indirect commands (N, 5) u4 sorted by material, which range of them each material has, and the world box of each:
     ``materials`` lists the material of every batch (−1: all opaque ones together), ``batch`` (N,) the batch of every
-    command, ``center`` and ``half`` (N, 3)."""
+    command, ``center`` and ``half`` (N, 3), ``bits`` (N,) the visibility bits of its instances."""
 
     commands: np.ndarray
     materials: list[int]
     batch: np.ndarray
     center: np.ndarray
     half: np.ndarray
+    bits: np.ndarray
     buffer: moderngl.Buffer
 
-    def visible(self, clip_from_world: np.ndarray, beyond: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+    def visible(
+        self, clip_from_world: np.ndarray, beyond: np.ndarray | None = None, among: tuple[int, ...] | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
         """The commands whose boxes touch the view volume of ``clip_from_world`` (column-major as for GLSL), and how
-        many of them each batch has. What lies wholly in the box ``beyond`` (2, 3) is left out."""
+        many of them each batch has. What lies wholly in the box ``beyond`` (2, 3) is left out, and what has none of the
+        bits ``among`` exactly."""
         m = clip_from_world.reshape(4, 4).T.astype("f8")
         planes = np.concatenate([m[3] + m[:3], m[3] - m[:3]])
         distance = self.center @ planes[:, :3].T + planes[:, 3] + self.half @ np.abs(planes[:, :3]).T
@@ -64,6 +68,8 @@ class DrawList:
             middle, reach = beyond.mean(axis=0), (beyond[1] - beyond[0]) / 2.0
             # Boxes that make up ``beyond`` touch its sides, by rounding from without.
             seen &= (np.abs(self.center - middle) + self.half > reach + 1e-6 * (reach.max() + np.abs(middle).max())).any(axis=1)
+        if among is not None:
+            seen &= np.isin(self.bits, among)
         return self.commands[seen], np.bincount(self.batch[seen], minlength=len(self.materials))
 
 
@@ -265,18 +271,23 @@ class GPUScene:
         """What was synced last."""
         return self._scene
 
+    def bits(self, visibility: int) -> tuple[int, ...]:
+        """The different visibility bits of instances that ``visibility`` rays see."""
+        return tuple(sorted({seen for _, _, seen, _, _ in self._groups if seen & visibility}))
+
     def draw(
         self, planned: Planned, stages, visibility: int, clip_from_world: np.ndarray, *, beyond: np.ndarray | None = None,
-        **options,
+        among: tuple[int, ...] | None = None, **options,
     ) -> None:
         """Draw surfaces that ``visibility`` rays see, each with its material's function.
 
         ``stages`` are the pass's shader files. Options: ``full`` evaluates every material, else only those that let light
         through; ``units`` is the first texture unit free for materials; ``defines``; ``only`` draws materials with that
-        flag of CompiledGraph alone. Nothing is drawn that lies wholly in the box ``beyond``.
+        flag of CompiledGraph alone. Nothing is drawn that lies wholly in the box ``beyond``; of
+        instances, only those whose visibility bits are ``among`` the given.
         """
         draws, prepared = self._prepared(planned, stages, visibility, options)
-        commands, counts = draws.visible(clip_from_world, beyond)
+        commands, counts = draws.visible(clip_from_world, beyond, among)
         if len(commands):
             draws.buffer.write(np.ascontiguousarray(commands))
         first = 0
@@ -344,6 +355,7 @@ class GPUScene:
             return self._draws[key]
         rows: list[tuple] = []
         boxes: list[np.ndarray] = []
+        bits: list[int] = []
         materials: dict[int, None] = {}
         for mesh_index, used, seen, first_instance, count in self._groups:
             if not seen & visibility or not used:
@@ -359,6 +371,7 @@ class GPUScene:
                 materials[material] = None
                 rows.append((material, 3 * triangles, count, start + 3 * first, base, first_instance))
                 boxes.append(self._group_box(box, first_instance, count))
+                bits.append(seen)
         order = sorted(materials)
         table = np.array(rows, "i8").reshape(-1, 6)
         batch = np.searchsorted(order, table[:, 0]) if order else np.zeros(0, "i8")
@@ -367,7 +380,7 @@ class GPUScene:
         commands = table[sort, 1:].astype("u4")
         buffer = self.gl.buffer("scene draw commands", size=max(1, len(commands)) * 20)
         self._draws[key] = DrawList(
-            commands, order, batch[sort], box.mean(axis=1), (box[:, 1] - box[:, 0]) / 2.0, buffer
+            commands, order, batch[sort], box.mean(axis=1), (box[:, 1] - box[:, 0]) / 2.0, np.array(bits, "i8")[sort], buffer
         )
         return self._draws[key]
 

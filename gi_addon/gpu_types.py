@@ -36,7 +36,8 @@ LIGHT = struct(
     ("v_ws", "f4", 3), ("spot_scale", "f4"),      # spot: 1 / ((1 − cos) blend)
     ("center_ws", "f4", 3), ("spread_tan", "f4"),  # of the whole light; tan of half the spread (area)
     ("patch_radius", "f4"), ("spread_scale", "f4"), ("shape", "i4"), ("flags", "i4"),
-    ("soft_radius2", "f4"), ("diffuse", "f4"), ("glossy", "f4"), ("_pad0", "u4"),  # m², of a point's or spot's soft disc
+    ("soft_radius2", "f4"), ("diffuse", "f4"), ("glossy", "f4"), ("receivers", "u4"),  # m², of a soft disc; sets lit
+    ("salt", "u4"),  # of its own sequences; the points of one world or of all emissive meshes share theirs
 )  # fmt: skip
 LIGHT_SUN, LIGHT_POINT, LIGHT_SPOT, LIGHT_AREA, LIGHT_WORLD, LIGHT_MESH = range(6)
 LIGHT_FLAG_SHADOW, LIGHT_FLAG_BOUNCE, LIGHT_FLAG_CAMERA = 1, 2, 4
@@ -63,6 +64,7 @@ VPL = struct(
     ("position_ws", "f4", 3), ("area", "f4"),
     ("normal_ws", "f4", 3), ("light", "i4"),  # that lit it, in rsm.lights; −1 another virtual light
     ("flux", "f4", 3), ("anisotropy", "f4"),
+    ("clear_ws", "f4", 3), ("key", "u4"),  # where rays to it end: clear of the cells of its own surface; its place in order
 )  # fmt: skip
 
 

@@ -122,8 +122,9 @@ class Pass:
     """One box of a technique's pipeline.
 
     ``rate`` is ``static`` (run only when stale: a stamp in ``depends``, a setting in ``settings`` or a static input has
-    changed) or ``subframe`` (every time; ``Planned.stale`` then tells what of it is still good). ``shaders`` maps a key to
-    stages (see ``GL.program``). ``figure`` names the paper's box; ``source`` says where its light is from if that is not plain.
+    changed) or ``subframe`` (every time; ``Planned.stale`` then tells what of it is still good). ``repeats``: what it writes
+    hangs on these, on its reads and on the sub-frame's number alone, so that a view that turns needs it once. ``shaders`` maps a
+    key to stages (see ``GL.program``). ``figure`` names the paper's box; ``source`` says where its light is from, if not plain.
     """
 
     title: ClassVar[str] = ""
@@ -135,10 +136,15 @@ class Pass:
     shaders: ClassVar[dict[str, dict[str, str]]] = {}
     depends: ClassVar[tuple[str, ...]] = ()
     settings: ClassVar[tuple[str, ...]] = ()
+    repeats: ClassVar[bool] = False
 
     def rate(self, facts: Facts) -> str:
         """``static`` or ``subframe``."""
         return "subframe"
+
+    def place(self, facts: Facts) -> tuple:
+        """What of the camera the pass's output depends on; it is stale when that changes."""
+        return ()
 
     def absent(self, facts: Facts) -> str | None:
         """Why this scene has no use for this pass, or None."""
@@ -148,8 +154,8 @@ class Pass:
         """Extra preprocessor defines of its shaders."""
         return {}
 
-    def run(self, frame: Frame, planned: Planned) -> None:
-        """Issue the GL work."""
+    def run(self, frame: Frame, planned: Planned) -> bool | None:
+        """Issue the GL work. False says that all it would have written is there already."""
         raise NotImplementedError
 
 
@@ -167,6 +173,8 @@ class Planned:
     programs: dict[Any, Any] = field(default_factory=dict)
     # Whether what the pass depends on has changed since it last ran: all of its output is due.
     stale: bool = True
+    # What the pass itself noted of its last run, to tell what of it is still good.
+    memory: dict[str, Any] = field(default_factory=dict)
 
     @property
     def title(self) -> str:

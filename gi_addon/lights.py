@@ -8,6 +8,7 @@ own; with one sub-frame every light is its centre.
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -32,7 +33,7 @@ from .gpu_types import (
     SHAPE_ELLIPSE,
     SHAPE_RECTANGLE,
 )
-from .scene import DIFFUSE, Light, Scene
+from .scene import DIFFUSE, EVERY_SET, Light, Scene
 from .sequence import sobol_2d
 from .world_map import WorldMap
 
@@ -120,6 +121,8 @@ class Source:
     # World and meshes: this source draws points `index` of every `count` per sub-frame.
     index: int = 0
     count: int = 1
+    # Of the sequences that are the light's own, whatever else shines.
+    salt: int = 0
     # A second shadow map, of the focus alone, where a backdrop would leave the first one coarse.
     near: bool = False
 
@@ -243,6 +246,21 @@ class LightRig:
         light = self.sources[index].light
         return light is None or light.use_shadow
 
+    @property
+    def linked(self) -> bool:
+        """Whether some light lights only some objects."""
+        return any(s.light is not None and s.light.receivers != EVERY_SET for s in self.sources)
+
+    def lights_kind(self, index: int, receivers: int) -> bool:
+        """Whether source ``index`` lights objects of set ``receivers``."""
+        light = self.sources[index].light
+        return light is None or bool(light.receivers >> receivers & 1)
+
+    def blocked_by(self, index: int, blockers: int) -> bool:
+        """Whether objects of set ``blockers`` shade source ``index``."""
+        light = self.sources[index].light
+        return light is None or bool(light.blockers >> blockers & 1)
+
     # -- sources -------------------------------------------------------------------------------------------------
 
     def _place(self, out: np.ndarray, source: Source, u: np.ndarray, subframes: int, *, bounce: bool) -> None:
@@ -250,6 +268,8 @@ class LightRig:
         out["views"] = source.views
         out["flags"] = LIGHT_FLAG_BOUNCE
         out["diffuse"] = out["glossy"] = 1.0
+        out["salt"] = source.salt
+        out["receivers"] = EVERY_SET
         light = source.light
         if source.kind == LIGHT_WORLD:
             world = self.world if bounce or self.direct_world is None else self.direct_world
@@ -264,6 +284,7 @@ class LightRig:
             self._place_on_mesh(out, source, u, subframes)
             return
         out["diffuse"], out["glossy"] = light.visible_diffuse, light.visible_glossy
+        out["receivers"] = light.receivers
         matrix = light.matrix
         center = matrix[:3, 3]
         x, y, z = (_unit(matrix[:3, k]) for k in range(3))
@@ -296,10 +317,8 @@ class LightRig:
                 cos = np.cos(0.5 * light.spot_size)
                 out["spot_cos"] = cos
                 out["spot_scale"] = 1.0 / max((1.0 - cos) * light.spot_blend, 1e-6)
-                # A scaled spot shines through an ellipse: directions are measured in its own, scaled, frame.
-                scale = np.array([np.linalg.norm(matrix[:3, k]) for k in range(3)])
-                scale = np.where(scale > 0, scale, 1.0)
-                out["u_ws"], out["v_ws"] = x * scale[2] / scale[0], y * scale[2] / scale[1]
+                # A scaled or sheared spot shines through an ellipse: directions are measured in its own frame.
+                out["u_ws"], out["v_ws"], out["axis_ws"] = _own_frame(matrix)
             return
         # Area: width and height come with the object's scale.
         size_u, size_v = light.size[0] * np.linalg.norm(matrix[:3, 0]), light.size[1] * np.linalg.norm(matrix[:3, 1])
@@ -445,7 +464,8 @@ def build_rig(
         elif light.kind == "POINT":
             sources.append(Source(LIGHT_POINT, seed, light, 6, light.radius > 0.0))
         elif light.kind == "SPOT":
-            single = light.spot_size <= _WIDEST_SINGLE_VIEW
+            # A map's axes are at right angles; a cone that is sheared by its parents has none.
+            single = light.spot_size <= _WIDEST_SINGLE_VIEW and not _sheared(light.matrix)
             sources.append(Source(LIGHT_SPOT, seed, light, 1 if single else 5, light.radius > 0.0))
         elif light.kind == "AREA" and area_lights:
             sources.append(Source(LIGHT_AREA, seed, light, 5, True))
@@ -456,6 +476,7 @@ def build_rig(
 
     for source in sources:
         source.near = focus.narrow and source.kind in (LIGHT_SUN, LIGHT_WORLD)
+        source.salt = source.seed if source.light is None else zlib.crc32(source.light.name.encode())
     radius = 0.5 * float(np.linalg.norm(focus.region[1] - focus.region[0]))
     coarser = _coarser_maps({s.seed: _power(s.light, radius) for s in sources if s.light is not None})
 
@@ -490,7 +511,9 @@ def build_rig(
         # it is fine enough.
         drawn_anew = source.kind in (LIGHT_AREA, LIGHT_MESH) and bounced(source)
         coarse = source.light is not None and coarser[source.seed] > 0
-        return not (drawn_anew and bounce_resolution >= shadow_resolution and not coarse)
+        # What the light lights but is not shaded by is in its bounce map too.
+        linked = source.light is not None and source.light.blockers != EVERY_SET
+        return not (drawn_anew and bounce_resolution >= shadow_resolution and not coarse and not linked)
 
     return LightRig(
         sources, focus, world, emitters,
@@ -526,6 +549,23 @@ def _unit(v: np.ndarray) -> np.ndarray:
     v = np.asarray(v, "f8")
     length = np.linalg.norm(v)
     return v / length if length > 0 else np.array([0.0, 0.0, 1.0])
+
+
+def _own_frame(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What a direction's products with are its coordinates x, y and −z in the frame of ``matrix`` (4, 4), to a scale: the
+    rows of its inverse, the last one of unit length."""
+    axes = matrix[:3, :3].copy()
+    flat = np.linalg.norm(axes, axis=0) <= 0.0
+    axes[:, flat] = np.eye(3)[:, flat]
+    rows = np.linalg.pinv(axes)
+    rows /= max(float(np.linalg.norm(rows[2])), 1e-30)
+    return rows[0], rows[1], -rows[2]
+
+
+def _sheared(matrix: np.ndarray) -> bool:
+    """Whether the axes of ``matrix`` (4, 4) are not at right angles, to what rounding leaves."""
+    axes = np.stack([_unit(matrix[:3, k]) for k in range(3)])
+    return bool(np.abs(axes @ axes.T - np.eye(3)).max() > 1e-4)
 
 
 def _frame(z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

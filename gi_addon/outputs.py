@@ -72,12 +72,13 @@ LONG_NAMES = {o.short: o.name for o in OUTPUTS.values()}
 #   volume.light                          radiance scattered towards the eye in front of the surface; alpha: the mean share
 #                                         of the light behind that still passes
 #   volume.transmittance                  that share by colour, where the technique knows it
+#   direct.shadow                         share of the direct irradiance that is not blocked: what a shadow catcher shows
 LAYERS: dict[str, tuple[str, ...]] = {
     "combined": (
         "gbuffer.depth", "gbuffer.diffuse", "gbuffer.emission", "direct.diffuse", "direct.glossy", "reflected.sources",
         "indirect.diffuse", "indirect.glossy", "gbuffer.transmission", "transmission.direct", "transmission.indirect",
         "volume.light",
-        "volume.transmittance", "subsurface.direct", "subsurface.indirect",
+        "volume.transmittance", "subsurface.direct", "subsurface.indirect", "direct.shadow",
     ),
     "depth": ("gbuffer.depth",),
     "normal": ("gbuffer.depth", "gbuffer.normal"),

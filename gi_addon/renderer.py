@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -87,8 +87,9 @@ class Renderer:
         subframes: int | None = None,
         camera: Camera | None = None,
         film_transparent: bool = False,
+        moving: bool = False,
     ) -> Plan:
-        """Sync the scene and plan a frame.
+        """Sync the scene and plan a frame. While the view is ``moving`` what only suits the sampling to it stays as it is.
 
         ``resolution`` (width, height) of the whole picture; ``region`` (x, y, width, height) the part to render, row 0
         at the bottom. Raises RenderError when there is nothing to render with.
@@ -114,13 +115,17 @@ class Renderer:
         origin = scene.far_origin()
         if origin.any():
             scene, camera = scene.moved(-origin), camera.moved(-origin)
-        stamps = scene.stamps()
+        # The view that is drawn counts, which need not be the scene's camera.
+        stamps = replace(scene, camera=camera).stamps()
+        if moving and self.frame is not None:
+            stamps["camera"] = self.frame.facts.stamps["camera"]
         self.gpu.sync(scene, stamps)
         size = (int(region[2]), int(region[3]))
         subframes = subframes or settings.samples
         facts = gather_facts(
             scene, self.gpu.compiled, settings, size, outputs, subframes, self._world_map(scene),
             self._emitters(scene, stamps), self._find_focus(scene, stamps),
+            np.asarray(camera.world_from_view, "f8")[:3, 3],
         )
         facts.stamps = stamps
         key = (
@@ -156,7 +161,7 @@ class Renderer:
         if [r.name for r in old.reads] == [r.name for r in planned.reads] and [w.name for w in old.writes] == [
             w.name for w in planned.writes
         ]:
-            planned.programs = dict(old.programs)
+            planned.programs, planned.memory = dict(old.programs), old.memory
 
     def subframe(self, index: int, cancel: CancelToken | None = None) -> None:
         """Render sub-frame ``index`` into the film. Static passes run if what they depend on has changed.
@@ -166,6 +171,7 @@ class Renderer:
         frame = self.frame
         frame.begin_subframe(index)
         rerun: set[str] = set()
+        written: set[str] = set()
         for position, planned in enumerate(self._plan.run):
             if cancel is not None and cancel.cancelled:
                 # What would have read the maps made so far has not: it must run next time, whatever its key says.
@@ -178,18 +184,22 @@ class Renderer:
                 tuple(facts.stamps[kind] for kind in task.depends),
                 tuple(frame.settings.get(path) for path in task.settings),
                 tuple(w.name for w in planned.writes),
-                facts.rig.shadow.size, facts.rig.bounce.size,
+                facts.rig.shadow.size, facts.rig.bounce.size, task.place(facts),
             )  # fmt: skip
             last = self._static.get(task.title)
             planned.stale = last is None or last[0] != key or bool(rerun & {r.name for r in planned.reads})
             static = task.rate(facts) == "static"
-            if static and not planned.stale:
+            number = (index, facts.subframes)
+            same = task.repeats and not planned.stale and last[2] == number and not written & {r.name for r in planned.reads}
+            if (static and not planned.stale) or same:
                 continue
-            self._static[task.title] = (key, tuple(w.name for w in planned.writes))
+            names = {w.name for w in planned.writes}
+            self._static[task.title] = (key, tuple(names), number)
             if static:
-                rerun |= {w.name for w in planned.writes}
+                rerun |= names
             with self.timers.measure(task.title):
-                task.run(frame, planned)
+                if task.run(frame, planned) is not False:
+                    written |= names
             if _CHECK_EACH_PASS:
                 self.gl.check(task.title)
 

@@ -164,6 +164,7 @@ class Light:
     shines along -Z. ``radius``: soft size in m (POINT, SPOT);
     ``angle``: full angular diameter (SUN), rad; ``spot_size`` full cone angle, rad; ``size`` (2,): width and height in
     object units; ``spread``: rad.
+    ``receivers``, ``blockers``: bit k says whether objects of set k are lit, and shade (``receiver_set``, ``blocker_set``).
     """
 
     name: str
@@ -182,6 +183,8 @@ class Light:
     visible_camera: bool = True
     visible_diffuse: bool = True
     visible_glossy: bool = True
+    receivers: int = (1 << 32) - 1
+    blockers: int = (1 << 32) - 1
 
 
 @dataclass
@@ -228,6 +231,29 @@ class World:
 CAMERA, DIFFUSE, GLOSSY, TRANSMISSION, VOLUME, SHADOW = (1 << i for i in range(6))
 ALL_RAYS = 63
 HOLDOUT = 64
+# What the camera sees of it is only the shadow on it.
+CATCHER = 128
+# Light linking: bits 8 to 12 say which set of objects an instance is lit with, bits 16 to 20 which it shades with; every light
+# says which sets it lights and which shade it. Blender has at most 64 sets, this has 32.
+LIGHT_SETS = 32
+EVERY_SET = (1 << LIGHT_SETS) - 1
+
+
+def receiver_set(visibility: int) -> int:
+    """The set that an instance of these bits is lit with."""
+    return visibility >> 8 & 31
+
+
+def blocker_set(visibility: int) -> int:
+    """The set that an instance of these bits shades with."""
+    return visibility >> 16 & 31
+
+
+def set_bits(receiver: int, blocker: int) -> int:
+    """The bits of an instance for its two sets."""
+    return receiver << 8 | blocker << 16
+
+
 # Mesh attribute that the Geometry node's Pointiness reads.
 POINTINESS = ".pointiness"
 
@@ -475,9 +501,12 @@ _TYPES.update({
 __all__ = [
     "ALL_RAYS",
     "CAMERA",
+    "CATCHER",
     "DIFFUSE",
+    "EVERY_SET",
     "GLOSSY",
     "HOLDOUT",
+    "LIGHT_SETS",
     "SHADOW",
     "TRANSMISSION",
     "VOLUME",
@@ -493,5 +522,8 @@ __all__ = [
     "ShaderGraph",
     "SnapshotError",
     "World",
+    "blocker_set",
+    "receiver_set",
     "replace",
+    "set_bits",
 ]  # fmt: skip

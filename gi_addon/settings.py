@@ -151,10 +151,20 @@ class RSMSettings:
         200, "Samples", "Virtual point lights gathered per pixel and sub-frame", low=1, high=4096,
         higher="less blotchy near surfaces", lower="faster",
     )  # fmt: skip
+    own_samples: bool = _setting(
+        False, "Samples of Each Light", "Every light has as many virtual lights of its own, whatever else shines, and all are "
+        "tested: lights then add up exactly",
+        higher="each light as fine as if it shone alone", lower="faster where many lights shine: they share the samples by flux",
+    )  # fmt: skip
     visibility: str = _setting(
         "CELLS", "Visibility", "Whether virtual lights are blocked by objects",
         choices=(("NONE", "None", "They shine through everything, as in 2005; near contacts are dimmed by ambient occlusion"),
                  ("CELLS", "Cells", "Rays to them are tested in a grid of the cells that surfaces pass through")),
+    )  # fmt: skip
+    visibility_rays: int = _setting(
+        128, "Visibility Rays", "Rays per pixel, of all sub-frames together, to virtual lights drawn by what they send; 0 tests "
+        "all of them",
+        low=0, high=4096, higher="less noise in half shadow", lower="faster, except 0",
     )  # fmt: skip
     visibility_resolution: int = _setting(
         128, "Visibility Resolution", "Cells along the scene's longest side", low=16, high=512,
@@ -170,19 +180,21 @@ class LPVSettings:
         32, "Resolution", "Cells along the longest side of the scene", low=8, high=128, unit="cells",
         higher="finer indirect light, less leaking through walls", lower="faster",
     )  # fmt: skip
+    cascades: str = _setting(
+        "AUTO", "Cascades", "Grids within each other around the camera, each of cells half as wide as the one around it",
+        choices=(("AUTO", "Automatic", "As many as bring a cell down to a quarter of the way from surface to surface"),
+                 ("1", "1", "One grid over the scene"), ("2", "2", "Cells half as wide around the camera"),
+                 ("3", "3", "A quarter"), ("4", "4", "An eighth")),
+    )  # fmt: skip
     iterations: int = _setting(
-        0, "Iterations", "How many cells far light is carried; 0 is as far as it comes, at the cost of one iteration", low=0,
-        high=512, higher="reaches farther", lower="dark far from lit surfaces; slower than 0 all the same",
+        0, "Iterations", "How many cells far light is carried, in one grid; 0 is as far as it comes, at the cost of one "
+        "iteration", low=0, high=512, higher="reaches farther", lower="dark far from lit surfaces; slower than 0 all the same",
     )  # fmt: skip
     directions: str = _setting(
         "AUTO", "Directions", "Directions that light travels in through the grid; too few for a fine grid show as rays",
         choices=(("AUTO", "Automatic", "72 up to 32 cells, 144 up to 64, 288 for more"),
                  ("48", "48", "Fastest"), ("72", "72", "For 32 cells"), ("144", "144", "For 64 cells"),
                  ("288", "288", "For 128 cells")),
-    )  # fmt: skip
-    glossy_rays: int = _setting(
-        2, "Glossy Rays", "Rays through the grid per pixel and sub-frame for glossy reflections", low=1, high=64,
-        higher="less noise on rough surfaces", lower="faster",
     )  # fmt: skip
     occlusion: bool = _setting(True, "Occlusion", "Objects stop light on its way through the grid")
 
@@ -204,8 +216,13 @@ class SSDOSettings:
         soft_high=100.0, unit="m", higher="light from farther away", lower="finer near by, dark rooms",
     )  # fmt: skip
     thickness: float = _setting(
-        0.25, "Thickness", "How thick what the screen shows is taken to be, as a share of its distance from the receiver",
+        0.25, "Thickness", "How thick what the screen shows is taken to be where no layer behind tells, as a share of its "
+        "distance from the receiver",
         low=0.01, high=10.0, higher="fewer leaks behind things", lower="light passes behind thin things",
+    )  # fmt: skip
+    layers: int = _setting(
+        2, "Layers", "How many surfaces behind each other are known at each pixel: those behind the first are not seen, but they "
+        "send light, and say how thick things are", low=1, high=3, higher="light from hidden surfaces", lower="faster",
     )  # fmt: skip
     occlusion: str = _setting(
         "MITTRING", "Ambient Occlusion", "How the Ambient Occlusion pass is made",
@@ -229,7 +246,7 @@ class SSDOSettings:
                   "light must be in the picture")),
     )  # fmt: skip
     margin: float = _setting(
-        0.0, "Margin", "How much is drawn beyond each side of the picture, as a share of its longer side: what lies there "
+        0.25, "Margin", "How much is drawn beyond each side of the picture, as a share of its longer side: what lies there "
         "still counts", low=0.0, high=1.0, higher="light from just outside", lower="faster",
     )  # fmt: skip
     sources: str = _setting(
@@ -273,6 +290,9 @@ class Settings:
     technique: str = _setting("RSM", "Technique", "How light bounces", choices=TECHNIQUES)
     use_indirect_diffuse: bool = _setting(True, "Indirect Diffuse", "Light that bounced off surfaces onto surfaces")
     use_glossy: bool = _setting(True, "Glossy Reflections", "What glossy surfaces mirror")
+    share_reflections: bool = _setting(
+        True, "Share Reflections", "Pixels of one surface share what their reflected rays found; rough reflections need it"
+    )
     use_shadows: bool = _setting(True, "Shadows", "Lights are blocked by objects")
     use_ao: bool = _setting(True, "Ambient Occlusion", "Near surfaces block light that nothing else tests")
     use_translucency: bool = _setting(True, "Translucency", "Light through and inside objects")

@@ -4,14 +4,16 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 
+import blf
 import bpy
 from bl_ui.utils import PresetPanel
 
 from . import presets
-from .effects import RESOURCES, source_of
+from .effects import RESOURCES, in_effect, source_of
 from .gl import shared
-from .host import comparison, status
+from .host import comparison, properties, status
 from .host.comparison import QUARTET_OT_compare, QUARTET_OT_open_page
 from .host.operators import QUARTET_MT_presets, QUARTET_OT_add_preset, QUARTET_OT_preset, QUARTET_OT_split_view
 from .outputs import OUTPUTS
@@ -28,6 +30,8 @@ CHARACTER = {
     "SSDO": ("Finest contact detail, needs no structure but the picture",
              "What the camera does not see gives no light"),
 }  # fmt: skip
+# Titles that fit into a narrow properties editor; the technique's own panel is called after its letters.
+_TITLES = {"shadows": "Shadow Maps", "ao": "Ambient Occlusion", "world": "World Light", "volume": "Volumetric Light"}
 _GROUPS = [f.name for f in dataclasses.fields(Settings) if dataclasses.is_dataclass(getattr(Settings(), f.name))]
 _TECHNIQUES = {name: label for name, label, _ in TECHNIQUES}
 _SAMPLING = ("samples", "viewport_samples", "motion_steps")
@@ -54,33 +58,58 @@ class _Panel:
         return self.layout.column()
 
 
-def lines(text: str, width: int) -> list[str]:
-    """``text`` in lines for labels, which Blender does not wrap."""
+def lines(text: str, room: float, width: Callable[[str], float] = len) -> list[str]:
+    """``text`` in lines for labels, which Blender does not wrap: none wider than ``room`` by ``width`` unless one word is."""
     out: list[str] = []
     for word in text.split():
-        if out and len(out[-1]) + 1 + len(word) <= width:
-            out[-1] += f" {word}"
+        longer = f"{out[-1]} {word}" if out else word
+        if out and width(longer) <= room:
+            out[-1] = longer
         else:
             out.append(word)
     return out
 
 
-# About: a letter of Blender's font and what else stands in a line of a panel, in pixels at scale 1.
-_LETTER, _AROUND = 6.5, 75
+# What else than text stands in a line of a panel, in pixels at scale 1: tabs and scroll bar are regions of their own.
+_AROUND = 62
+_UNKNOWN_WIDTH = 340  # pixels, where nothing is being drawn
+_NARROW = 300  # pixels at scale 1, below which four buttons beside each other lose their names
 
 
-def _letters() -> int:
-    """How many letters fit into a line of the region that is being drawn."""
+def _width() -> float:
+    """Width of the region that is being drawn, in pixels at scale 1."""
     region = bpy.context.region
     if region is None or region.width <= 1:
-        return 52
-    return max(16, int((region.width / bpy.context.preferences.system.ui_scale - _AROUND) / _LETTER))
+        return _UNKNOWN_WIDTH
+    return region.width / _scale()
 
 
-def _say(layout, text: str, icon: str = "NONE") -> None:
+def _scale() -> float:
+    return bpy.context.preferences.system.ui_scale or 1.0  # 0 without a window
+
+
+def _letters(text: str) -> float:
+    """Width of ``text`` in Blender's interface font, in pixels at scale 1."""
+    blf.size(0, bpy.context.preferences.ui_styles[0].widget.points * _scale())
+    return blf.dimensions(0, text)[0] / _scale()
+
+
+def _say(layout, text: str, icon: str = "NONE", *, active: bool = True) -> None:
     column = layout.column(align=True)
-    for number, line in enumerate(lines(text, _letters())):
+    column.active = active
+    for number, line in enumerate(lines(text, _width() - _AROUND, _letters)):
         column.label(text=line, icon=icon if number == 0 else "BLANK1" if icon != "NONE" else "NONE")
+
+
+def _prop(layout, scene, path: str, text: str | None = None) -> None:
+    """A setting, greyed out while it has no effect."""
+    owner = scene.quartet
+    *groups, name = path.split(".")
+    for group in groups:
+        owner = getattr(owner, group)
+    row = layout.row()
+    row.active = in_effect(path, properties.read(scene))
+    row.prop(owner, name, **({} if text is None else {"text": text}))
 
 
 class QUARTET_PT_presets(PresetPanel, bpy.types.Panel):
@@ -111,18 +140,19 @@ class QUARTET_PT_technique(_Panel, bpy.types.Panel):
         if status.problem():
             box = self.layout.box()
             _say(box, status.problem(), "ERROR")
-        row = self.layout.row(align=True)
+        grid = self.layout.grid_flow(row_major=True, columns=2 if _width() < _NARROW else 4, even_columns=True, align=True)
         for name, preset in presets.PRESETS.items():
-            row.operator(QUARTET_OT_preset.bl_idname, text=preset.label).preset = name
+            grid.operator(QUARTET_OT_preset.bl_idname, text=preset.label).preset = name
+        # Over the whole width: these names are long.
+        self.layout.prop(settings, "technique", text="")
         column = self._column()
-        column.prop(settings, "technique")
         strength, weakness = CHARACTER.get(settings.technique, ("", ""))
         if strength:
             _say(column, strength, "ADD")
             _say(column, weakness, "REMOVE")
         for name in _TOP:
             if name not in _ELSEWHERE:
-                column.prop(settings, name)
+                _prop(column, context.scene, name)
 
 
 class QUARTET_PT_sampling(_Panel, bpy.types.Panel):
@@ -133,7 +163,9 @@ class QUARTET_PT_sampling(_Panel, bpy.types.Panel):
     def draw(self, context):
         column = self._column()
         for name, text in zip(_SAMPLING, ("Render", "Viewport", "Motion Steps"), strict=True):
-            column.prop(context.scene.quartet, name, text=text)
+            row = column.row()
+            row.active = name != "motion_steps" or context.scene.render.use_motion_blur
+            row.prop(context.scene.quartet, name, text=text)
 
 
 class QUARTET_PT_effects(_Panel, bpy.types.Panel):
@@ -148,21 +180,20 @@ class QUARTET_PT_effects(_Panel, bpy.types.Panel):
         column = self.layout.column()
         for effect in RESOURCES:
             source = source_of(settings.technique, effect)
+            used = getattr(settings, effect)
             row = column.row()
             row.prop(settings, effect)
-            row = row.row()
-            row.active = False
-            row.label(text=f"{_KINDS[source.kind]}: {source.text}" if source.kind != "none" else source.text,
-                      icon=_ICONS[source.kind])  # fmt: skip
-            if source.detail:
-                row = column.row()
-                row.active = False
-                row.label(text=source.detail, icon="BLANK1")
+            if source.kind != "none":
+                row.label(icon=_ICONS[source.kind])
             why = left_out.get(source.text)
-            if getattr(settings, effect) and why:
-                row = column.row()
-                row.active = False
-                row.label(text=f"left out: {why}", icon="INFO")
+            if source.kind == "none":
+                _say(column, source.text, _ICONS["none"], active=False)
+            elif used and why:
+                _say(column, f"left out: {why}", "INFO", active=False)
+            else:
+                _say(column, f"{_KINDS[source.kind]}: {source.text}", "BLANK1", active=False)
+                if source.detail:
+                    _say(column, source.detail, "BLANK1", active=False)
 
 
 class QUARTET_PT_film(_Panel, bpy.types.Panel):
@@ -175,7 +206,7 @@ class QUARTET_PT_film(_Panel, bpy.types.Panel):
         column = self._column()
         column.prop(context.scene.render, "film_transparent", text="Transparent")
         for name in _FILM:
-            column.prop(context.scene.quartet, name)
+            _prop(column, context.scene, name)
 
 
 class _GroupPanel(_Panel):
@@ -190,17 +221,13 @@ class _GroupPanel(_Panel):
 
     def draw(self, context):
         column = self._column()
-        group = getattr(context.scene.quartet, self.group)
         for field in dataclasses.fields(getattr(Settings(), self.group)):
-            column.prop(group, field.name)
+            _prop(column, context.scene, f"{self.group}.{field.name}")
 
 
 def _group_label(name: str) -> str:
-    """A settings group's title: its technique's, or what its docstring opens with."""
-    if name.upper() in _TECHNIQUES:
-        return _TECHNIQUES[name.upper()]
-    text = type(getattr(Settings(), name)).__doc__ or name
-    return text.split("(")[0].split(",")[0].strip(" .").title()
+    """A settings group's title."""
+    return f"{name.upper()} Settings" if name.upper() in _TECHNIQUES else _TITLES[name]
 
 
 def _group_panels() -> list[type]:
@@ -224,17 +251,16 @@ class QUARTET_PT_performance(_Panel, bpy.types.Panel):
         for report in status.latest.values():
             width, height = report.resolution
             box = layout.box()
-            box.label(text=f"{report.kind.title()}: {report.technique}, {width} × {height}, {report.subframes} sub-frames, "
-                           f"{report.seconds:.2f} s, {report.mib:.1f} MiB")  # fmt: skip
-            grid = box.grid_flow(row_major=True, columns=3, align=True)
-            for row in report.rows:
-                grid.label(text=row.title)
-                grid.label(text="" if row.milliseconds is None else f"{row.milliseconds:.2f} ms")
-                grid.label(text=f"{row.mib:.2f} MiB")
+            _say(box, f"{report.kind.title()}: {report.technique}, {width} × {height}, {report.subframes} sub-frames, "
+                      f"{report.seconds:.2f} s, {report.mib:.1f} MiB")  # fmt: skip
             column = box.column(align=True)
-            column.active = False
+            for row in report.rows:
+                numbers = [f"{row.mib:.1f} MiB"]
+                if row.milliseconds is not None:
+                    numbers = [f"{row.milliseconds:.1f} ms"] if _width() < _NARROW else [f"{row.milliseconds:.1f} ms", *numbers]
+                _row(column, row.title, numbers)
             for title, reason in report.skipped:
-                column.label(text=f"{title}: {reason}", icon="CHECKBOX_DEHLT")
+                _say(box, f"{title}: {reason}", "CHECKBOX_DEHLT", active=False)
 
 
 class QUARTET_PT_materials(_Panel, bpy.types.Panel):
@@ -267,7 +293,7 @@ class QUARTET_PT_compare(_Panel, bpy.types.Panel):
         column = self._column()
         for name in ("reference", "reference_samples", "compare_percentage", "open_page"):
             column.prop(window, name)
-        row = layout.row()
+        row = layout.column(align=True) if _width() < _NARROW else layout.row()
         row.operator(QUARTET_OT_compare.bl_idname, icon="RENDER_STILL")
         row.operator(QUARTET_OT_split_view.bl_idname, icon="WINDOW")
         if comparison.running is not None:
@@ -281,16 +307,25 @@ class QUARTET_PT_compare(_Panel, bpy.types.Panel):
         column.prop(window, "compare_pass")
         column.prop(window, "compare_view")
         box = layout.box()
-        box.label(text=outcome.title)
-        grid = box.grid_flow(row_major=True, columns=5, align=True)
-        for title in ("Pass", "Gain", "relMSE", "Noise", "FLIP"):
-            grid.label(text=title)
+        _say(box, outcome.title)
+        column = box.column(align=True)
+        figures = [("Gain", "gain"), ("relMSE", "rel_mse"), ("Noise", "noise_floor"), ("FLIP", "flip")]
+        if _width() < _NARROW:
+            figures = [("relMSE", "rel_mse"), ("FLIP", "flip")]
+        _row(column, "Pass", [title for title, _ in figures])
         for name, score in outcome.scores.items():
-            grid.label(text=name)
-            for value in (score.gain, score.rel_mse, score.noise_floor, score.flip):
-                grid.label(text=f"{value:.3g}")
+            _row(column, name, [f"{getattr(score, figure):.2g}" for _, figure in figures])
         box.operator(QUARTET_OT_open_page.bl_idname, icon="URL")
         _say(box, "relMSE is the error beyond Cycles' own noise; gain is the ratio of all light")
+
+
+def _row(layout, name: str, cells: list[str]) -> None:
+    """A row of a table: a name, and numbers that stand under each other."""
+    split = layout.split(factor=0.55 if len(cells) < 3 else 0.4)
+    split.label(text=name)
+    row = split.row()
+    for cell in cells:
+        row.label(text=cell)
 
 
 class QUARTET_PT_passes(_Panel, bpy.types.Panel):
@@ -300,7 +335,8 @@ class QUARTET_PT_passes(_Panel, bpy.types.Panel):
     bl_context = "view_layer"
 
     def draw(self, context):
-        column = self._column()
+        # Names as long as these need the whole width.
+        column = self.layout.column()
         for output in OUTPUTS.values():
             owner, _, flag = output.flag.rpartition(".")
             target = getattr(context.view_layer, owner, None) if owner else context.view_layer
@@ -376,7 +412,8 @@ _seen = -1
 
 
 def _watch() -> None:
-    if not bpy.app.timers.is_registered(_look):
+    # Without a window there is nothing to redraw, and Blender 4.5 does not end while such a timer waits.
+    if not bpy.app.background and not bpy.app.timers.is_registered(_look):
         bpy.app.timers.register(_look, first_interval=_LOOK)
 
 

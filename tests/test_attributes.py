@@ -86,3 +86,22 @@ def test_a_cube_of_a_volume_scatters_and_absorbs_within_itself(blender, gl, kind
     cube(blender, scene, (0.0, 0.0, 0.75), 1.5, material_of(blender, connect))
     # Cycles' first bounce inside the volume is the light scattered once.
     agree(kind, scene, ("Combined",), samples=256, bounces=1, rel_mse=0.03, gain=0.03)
+
+
+def test_several_volumes_turned_boxes_and_balls_each_fill_their_own_place(blender, gl):
+    """A box on its corner and a ball that touches it, of different stuff."""
+
+    def filled_with(density, color):
+        def connect(tree, output):
+            volume = tree.nodes.new("ShaderNodeVolumeScatter")
+            volume.inputs["Density"].default_value, volume.inputs["Color"].default_value = density, (*color, 1.0)
+            tree.links.new(volume.outputs[0], output.inputs["Volume"])
+
+        return material_of(blender, connect)
+
+    scene = plane(blender)
+    box = cube(blender, scene, (-0.7, 0.0, 1.0), 1.0, filled_with(0.9, (0.9, 0.7, 0.5)))
+    box.rotation_euler, box.scale = (0.5, 0.6, 0.4), (1.4, 0.8, 1.0)
+    blender.ops.mesh.primitive_uv_sphere_add(radius=0.8, location=(0.6, 0.0, 1.0))
+    blender.context.object.data.materials.append(filled_with(1.5, (0.3, 0.6, 0.9)))
+    agree("volumes", scene, ("Combined",), samples=256, bounces=1, rel_mse=0.03, gain=0.03)

@@ -51,7 +51,8 @@ def test_light_does_not_know_how_far_the_ground_goes(gl, technique):
     """A ground of 1 km looks as one of 8 m does: of the light that the wall gets from the ground, what lies beyond 4 m adds
     less than 5 % (a floor's view factor from a point at height h of a wall, ½ (1 − h/√(h² + R²))-like, ends there)."""
     passes = ("Diffuse Direct", "Diffuse Indirect")
-    options = {"technique": technique, "samples": 4, "resolution": (64, 36)}
+    # RSM's few virtual lights near the wall are ± 15 % in 4 sub-frames.
+    options = {"technique": technique, "samples": 16 if technique == "RSM" else 4, "resolution": (64, 36)}
     near, far = (make(props(size), *passes, **options).passes for size in (8.0, 1000.0))
     # The cube's and the wall's shadows, to the pixel.
     assert np.abs(near["Diffuse Direct"] - far["Diffuse Direct"]).mean() < 0.01 * near["Diffuse Direct"].mean()

@@ -13,6 +13,7 @@ from gi_addon.focus import Focus
 from gi_addon.gl import shared
 from gi_addon.gpu_types import LIGHT_WORLD
 from gi_addon.lights import Emitters, build_rig, spread_profile
+from gi_addon.materials.ies import mean_strength
 from gi_addon.renderer import Renderer
 from gi_addon.settings import Settings
 from gi_addon.world_map import WorldMap
@@ -190,3 +191,51 @@ def test_sources_move_with_the_subframes_only_where_they_have_an_extent(gl):
     assert (a["axis_ws"][world] != b["axis_ws"][world]).any()
     once = rig.sample(0, 1, bounce=False).lights
     np.testing.assert_allclose(once["position_ws"][1], (0, 0, 1), atol=1e-6)
+
+
+def test_a_block_of_two_to_the_n_texels_is_of_one_tile():
+    """Coarser levels of an atlas's sums are then each tile's own: 2^n blocks at multiples of 2^n."""
+    sizes = [100, 512, 33, 64, 300]
+    corners, _ = atlas.pack(sizes, power_of_two=True)
+    blocks = set()
+    for (x, y), size in zip(corners, sizes, strict=True):
+        block = 1 << (size - 1).bit_length()
+        assert x % block == y % block == 0
+        covered = {(i, j) for i in range(x, x + block, 16) for j in range(y, y + block, 16)}
+        assert not covered & blocks
+        blocks |= covered
+
+
+def test_many_dim_lights_share_samples_without_losing_light(gl):
+    """40 lamps and 16 samples: a lamp has one in some sub-frames only, and all of its light in the mean. Each lamp sees the
+    whole sphere, so of L lamps N samples in each of S sub-frames are discs of L/(NS) of it, and form factors K A/(1 + K A)
+    are less than K A by 1 + L/(NS) (gather_lib.glsl)."""
+    rng = np.random.default_rng(4)
+    b = scenes.SceneBuilder()
+    b.add(scenes.sphere(2.0, 48, 24, inward=True), scenes.diffuse((0.5,) * 3))
+    for i in range(40):
+        light = scenes.point_light(rng.uniform(-0.3, 0.3, 3), 1.0 + i % 3)
+        light.name = f"Lamp {i}"
+        b.light(light)
+    scene = b.build(scenes.perspective((0, -1, 0), (0, 1, 0), 1.0))
+    power = sum(float(light.emission[0]) for light in scene.lights)
+    result = make(scene, "Diffuse Indirect", samples=32, rsm__samples=16, resolution=(16, 9))
+    exact = 0.5 * power / (4 * np.pi * 2.0**2) / np.pi
+    assert result.passes["Diffuse Indirect"].mean() == pytest.approx(exact / (1 + 40 / (16 * 32)), rel=0.01)
+
+
+@pytest.mark.parametrize(("angles", "candela", "mean"), [
+    ("0 90 180", "1 1 1", 0.0707),       # Cycles, an emission of one such lamp over a sphere of 64 x 32 pixels
+    ("0 30 60 90 180", "1000 900 400 50 0", 16.90),
+])  # fmt: skip
+def test_a_photometric_lamp_sends_what_its_file_says_on_average(angles, candela, mean):
+    """Cycles' flux through a sphere around the lamp, over its power; it bends between the angles, which here are straight."""
+    count = len(angles.split())
+    file = f"IESNA:LM-63-2002\n[TEST] some lamp\nTILT=NONE\n1 1000 1 {count} 1 1 2 0 0 0\n1 1 100\n{angles}\n0\n{candela}\n"
+    assert mean_strength(file) == pytest.approx(mean, rel=0.05)
+    assert mean_strength(file.replace("1 1000 1", "1 1000 2")) == pytest.approx(2.0 * mean, rel=0.05)
+
+
+@pytest.mark.parametrize("text", ["", "TILT=NONE", "TILT=NONE\n1 1000 1 5 1", "TILT=INCLUDE\n1 2 3\nx"])
+def test_what_is_no_photometric_file_has_no_mean(text):
+    assert mean_strength(text) is None

@@ -6,6 +6,7 @@ from __future__ import annotations
 import re
 import time
 import types
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,8 +14,9 @@ import pytest
 from gi_addon import presets
 from gi_addon.compare import exr, exr_plain, flip, scenes, sheet
 from gi_addon.compare.page import number
-from gi_addon.effects import RESOURCES, source_of
+from gi_addon.effects import RESOURCES, in_effect, needs_of, source_of
 from gi_addon.engines import TECHNIQUES
+from gi_addon.renderer import render
 from gi_addon.settings import Settings, walk
 
 
@@ -47,7 +49,7 @@ class Layout:
     def _same(self, *_, **__):
         return self
 
-    row = column = box = grid_flow = _same
+    row = column = box = grid_flow = split = _same
 
 
 def draw(cls, context):
@@ -94,6 +96,45 @@ def test_every_setting_is_in_a_panel_once(context):
         assert not others & {n.split(".")[0] for n in names}
         drawn += names
     assert set(drawn) == {path for path, _, _ in walk()}
+
+
+# For each need of a setting: settings under which it is not met.
+_UNMET = {"ssdo.shadows=CONTACT": {"ssdo.shadows": "MAPS"}, "volume.density": {"volume.density": 0.0}}
+
+
+@pytest.mark.parametrize("path", [p for p, _, _ in walk() if needs_of(p)])
+def test_what_is_greyed_out_changes_nothing(gl, path):
+    """A setting whose panel greys it out is changed: the picture, AO pass and all, stays bit-identical. Changed again with its
+    need met it is not greyed."""
+    first = path.split(".")[0].upper()
+    base = Settings()
+    base.technique = first if first in TECHNIQUES else "RSM"
+    base.samples, base.lpv.resolution, base.vct.resolution = 4, 16, 32
+    base.rsm.resolution = base.shadows.resolution = base.world.resolution = 64
+    assert in_effect(path, base) or any("=" in need or need == "volume.density" for need in needs_of(path))
+    for need in needs_of(path):
+        off = base.copy()
+        for name, value in _UNMET.get(need, {need: False}).items():
+            off.set(name, value)
+        assert not in_effect(path, off)
+        changed = off.copy()
+        meta, value = next((m, v) for p, v, m in walk() if p == path)
+        if meta.choices:
+            changed.set(path, next(c[0] for c in meta.choices if c[0] != value))
+        else:
+            changed.set(path, not value if isinstance(value, bool) else 2 * value if 2 * value <= meta.high and value else 0.5)
+        scene = replace(scenes.effect("glossy"), world=scenes.world((0.3, 0.3, 0.4)))
+        pictures = [render(scene, s, ("Combined", "Ambient Occlusion"), resolution=(24, 14)).passes for s in (off, changed)]
+        for name in pictures[0]:
+            assert np.array_equal(pictures[0][name], pictures[1][name]), (need, name)
+
+
+@pytest.mark.blender
+def test_labels_are_wrapped_between_words(blender):
+    from gi_addon.ui import lines
+
+    assert lines("one two three four", 9) == ["one two", "three", "four"]
+    assert lines("extraordinarily long", 6) == ["extraordinarily", "long"] and lines("", 5) == []
 
 
 @pytest.mark.blender
@@ -214,7 +255,7 @@ def test_a_preset_sets_the_scene(context, blender):
 
     assert blender.ops.quartet.preset(preset="FINAL") == {"FINISHED"}
     scene = blender.context.scene
-    assert scene.quartet.samples == 64 and scene.quartet.rsm.samples == 400
+    assert (scene.quartet.samples, scene.quartet.bounces) == (16, 4)
     settings = properties.read(scene)
     for path, value in presets.apply(Settings(), "FINAL").as_dict().items():
         if path != "technique":
@@ -233,9 +274,9 @@ def test_presets_hold_valid_values():
 
 
 def test_the_paper_preset_leaves_nothing_behind():
-    """Every preset of ours names what the paper's changes but the number of bounces, which is the user's."""
+    """Every preset of ours names what the paper's changes."""
     for name, preset in presets.PRESETS.items():
-        assert name == "PAPER" or set(presets.PRESETS["PAPER"].values) - {"bounces"} <= set(preset.values), name
+        assert name == "PAPER" or set(presets.PRESETS["PAPER"].values) <= set(preset.values), name
 
 
 @pytest.mark.parametrize("technique", sorted(TECHNIQUES))

@@ -89,6 +89,138 @@ def test_changes_leave_no_vertex_arrays_behind(gl, monkeypatch):
     assert counts[1] > 0 and len(set(counts[1:10])) == 1 and counts[10] == 0
 
 
+def _changes():
+    """(name, scene, camera, resolution) one after the other, each one change away from the one before. Every kind of light
+    whose maps follow the sub-frame shines: an area light, a soft spot, the sky."""
+    box = scenes.cornell()
+    size = (32, 18)
+    lights = [scenes.area_light((0.3, 0.2, 0.9), (0.0, 0.0, -1.0), 10.0, (0.3, 0.3)),
+              scenes.spot_light((-0.5, -0.6, 0.8), (0.0, 0.3, -1.0), 30.0, 1.2, 0.3, radius=0.1)]  # fmt: skip
+    base = replace(box, lights=lights, world=scenes.world((0.4, 0.5, 0.7)))
+    turned = replace(base.camera, world_from_view=base.camera.world_from_view @ _turn(0.05))
+    brighter = replace(base, lights=[lights[0], replace(lights[1], emission=lights[1].emission * 2.0)])
+    lifted = lights[1].matrix.copy()
+    lifted[2, 3] -= 0.2
+    moved = replace(brighter, lights=[lights[0], replace(brighter.lights[1], matrix=lifted)])
+    fewer = replace(moved, lights=moved.lights[1:])
+    instances = Instances.make([*fewer.instances.mesh], [*fewer.instances.matrix], [*fewer.instances.materials])
+    instances.matrix[-1][0, 3] += 0.1
+    return [("first", base, base.camera, size), ("turned", base, turned, size), ("larger", base, turned, (48, 27)),
+            ("brighter", brighter, turned, (48, 27)), ("light moved", moved, turned, (48, 27)),
+            ("light gone", fewer, turned, (48, 27)), ("object moved", replace(fewer, instances=instances), turned, (48, 27)),
+            ]  # fmt: skip
+
+
+def _turn(angle: float) -> np.ndarray:
+    out = np.eye(4)
+    out[0, 0] = out[2, 2] = np.cos(angle)
+    out[0, 2], out[2, 0] = np.sin(angle), -np.sin(angle)
+    return out
+
+
+@pytest.mark.parametrize("technique", ["RSM", "LPV", "VCT", "SSDO"])
+def test_what_is_kept_between_changes_is_what_would_be_made_again(gl, technique):
+    """First sub-frames after one change each, in one renderer that keeps what it can, and in a new one each: bit-identical."""
+    settings = Settings()
+    settings.technique, settings.samples = technique, 4
+    settings.rsm.resolution, settings.shadows.resolution = 64, 64
+    # Which directions the sky's light is drawn by is a matter of noise, and kept when the picture grows.
+    settings.world.aimed = False
+    settings.lpv.resolution, settings.vct.resolution = 16, 32
+
+    def first(renderer, scene, camera, size):
+        renderer.begin(scene, settings, resolution=size, camera=camera)
+        renderer.subframe(0)
+        return renderer.film()["combined"]
+
+    def job(g):
+        kept = Renderer(g)
+        try:
+            for name, *change in _changes():
+                picture, fresh = first(kept, *change), Renderer(g)
+                try:
+                    yield name, picture, first(fresh, *change)
+                finally:
+                    fresh.close()
+        finally:
+            kept.close()
+
+    for name, picture, fresh in gl(lambda g: list(job(g))):
+        assert picture.max() > 0.0
+        assert np.array_equal(picture, fresh), name
+
+
+def test_while_the_view_moves_the_skys_directions_stay_and_so_do_their_maps(gl, monkeypatch):
+    """Directions are aimed at what the camera sees: a turned view aims them anew, and draws their maps; a moving one does not,
+    and the first frame at rest does."""
+    from gi_addon.passes import lights
+
+    settings = Settings()
+    settings.samples = 4
+    settings.rsm.resolution = settings.shadows.resolution = settings.world.resolution = 64
+    scene = replace(scenes.cornell(), world=scenes.world((0.4, 0.5, 0.7)))
+    turned = replace(scene.camera, world_from_view=scene.camera.world_from_view @ _turn(0.4))
+    drawn = []
+
+    def counted(*args, tiles, **kwargs):
+        drawn.append(len(tiles))
+        return draw(*args, tiles=tiles, **kwargs)
+
+    draw = lights._draw_tiles
+    monkeypatch.setattr(lights, "_draw_tiles", counted)
+
+    def job(g):
+        renderer, counts = Renderer(g), []
+        try:
+            for camera, moving in ((scene.camera, True), (turned, True), (turned, False)):
+                drawn.clear()
+                renderer.begin(scene, settings, resolution=(32, 18), camera=camera, moving=moving)
+                renderer.subframe(0)
+                counts.append(sum(drawn))
+            return counts
+        finally:
+            renderer.close()
+
+    first, moving, rest = gl(job)
+    assert first > rest > moving == 0
+
+
+def test_light_maps_are_drawn_where_a_light_moved_and_nowhere_else(gl, monkeypatch):
+    """Tiles drawn for each change: none when the camera turns, the picture grows or a lamp's power changes; the moved lamp's own;
+    all when a surface moves."""
+    from gi_addon.passes import lights
+
+    settings = Settings()
+    settings.samples = 4
+    settings.rsm.resolution, settings.shadows.resolution = 64, 64
+    drawn = []
+
+    def counted(*args, tiles, **kwargs):
+        drawn.append(len(tiles))
+        return draw(*args, tiles=tiles, **kwargs)
+
+    draw = lights._draw_tiles
+    monkeypatch.setattr(lights, "_draw_tiles", counted)
+
+    def job(g):
+        renderer, counts = Renderer(g), {}
+        try:
+            for name, scene, camera, size in _changes():
+                drawn.clear()
+                renderer.begin(replace(scene, world=scenes.world()), settings, resolution=size, camera=camera)
+                renderer.subframe(0)
+                counts[name] = sum(drawn)
+            return counts
+        finally:
+            renderer.close()
+
+    counts = gl(job)
+    assert counts["turned"] == counts["larger"] == counts["brighter"] == 0
+    # The spot's shadow map and bounce map.
+    assert counts["light moved"] == 2
+    assert counts["first"] > counts["object moved"] == 2
+
+
 @pytest.mark.blender
 @pytest.mark.parametrize("name", ["sponza/sponza_crytek", "living_room_bitterli/living_room"])
 def test_real_scenes_render_finite_and_lit(blender, gl, shared_scenes, name):

@@ -94,10 +94,10 @@ def test_ready_references_are_averaged_in_blocks(tmp_path):
 
 
 @pytest.mark.parametrize("technique", sorted(TECHNIQUES))
-@pytest.mark.parametrize("sweep", ["none", "samples", "quick", "full"])
+@pytest.mark.parametrize("sweep", ["none", "presets", "samples", "quick", "full"])
 def test_every_candidate_of_a_sweep_can_be_set(technique, sweep):
     found = technique_sweep(technique, sweep)
-    assert len(found) == len(set(found)) >= {"none": 1, "samples": 2, "quick": 3, "full": 7}[sweep]
+    assert len(found) == len(set(found)) >= {"none": 1, "presets": 3, "samples": 5, "quick": 6, "full": 10}[sweep]
     for candidate in found:
         settings = candidate.settings(Settings())
         assert settings.technique == technique and all(settings.get(k) == v for k, v in candidate.options)
@@ -316,6 +316,31 @@ def test_the_yardstick_is_cycles_at_one_sample_denoised(written):
     rows = report.yardstick(measured.record)
     assert rows[0][0] == "Cycles 1 spp + OIDN" and rows[0][1] == "300 ms"
     assert {row[0] for row in rows[1:]} == {"RSM", "Cycles", "Cycles + OIDN"}
+
+
+def test_presets_are_judged_by_what_they_are_meant_for(written):
+    """A preset within its share of the yardstick's time passes by time, one beyond it fails, and so by error."""
+    _, measured = written
+    record = json.loads(json.dumps(measured.record, default=float))
+    unit = next(c for c in record["candidates"] if c["method"] == "Cycles + OIDN" and c["options"]["samples"] == 1)
+    mine = next(c for c in record["candidates"] if c["method"] == "RSM")
+    error = unit["scores"]["Combined"]["Rinf"]["rel_mse"]
+    for share, factor in ((0.5, 0.5), (2.0, 2.0)):
+        mine.update(options={"preset": "BALANCED"}, ms=share * unit["ms"])
+        mine["scores"]["Combined"]["Rinf"]["rel_mse"] = factor * error
+        (row,) = report.preset_rows(record)
+        assert row[:2] == ["RSM", "Balanced"]
+        assert all(("class=ok" in cell) == (share < 1.0) for cell in (row[3], row[5])), row
+    assert report.preset_rows({**record, "candidates": [c for c in record["candidates"] if c is not unit]}) == []
+
+
+def test_a_preset_of_several_bounces_is_not_compared_with_one(written):
+    """What counts is how often a candidate bounces, however it was set."""
+    assert sweeps.Candidate("LPV", (("preset", "FINAL"),)).settings().bounces > 1
+    _, measured = written
+    record = {**measured.record, "candidates": [{**c, "bounces": 3} for c in measured.record["candidates"]]}
+    assert charts.points_of(record, "Combined", "R1", "rel_mse") == []
+    assert charts.points_of(record, "Combined", "Rinf", "rel_mse")
 
 
 @pytest.mark.skipif(BROWSER is None, reason="no Chromium here")

@@ -105,12 +105,12 @@ def test_light_is_linear_in_power(gl):
 
 
 def test_two_lights_are_the_sum_of_each(gl):
-    """Stability test 17. Each light alone draws other samples than both together: equal up to their noise, and the
-    direct pass exactly."""
-    def box(*lights):
+    """Stability test 17. Sharing their samples, lights are equal to those alone up to noise, and with samples of their own, as
+    in the direct pass, exactly: to the rounding of the sum."""
+    def box(*lights, own=False):
         scene = scenes.cornell(blocks=False)
         scene.lights = list(lights)
-        return make(scene, "Diffuse Direct", "Diffuse Indirect", samples=16).passes
+        return make(scene, "Diffuse Direct", "Diffuse Indirect", samples=4 if own else 16, rsm__own_samples=own).passes
 
     one, two = scenes.point_light((-0.4, 0, 1.5), 40.0), scenes.spot_light((0.3, 0, 1.9), (0, 0, 0), 90.0, 1.4, 0.3)
     both, a, b = box(one, two), box(one), box(two)
@@ -118,6 +118,9 @@ def test_two_lights_are_the_sum_of_each(gl):
     assert np.abs(both["Diffuse Direct"] - total).max() <= 1e-3 * total.max()
     indirect = a["Diffuse Indirect"] + b["Diffuse Indirect"]
     assert both["Diffuse Indirect"].mean() == pytest.approx(indirect.mean(), rel=0.01)
+    both, a, b = box(one, two, own=True), box(one, own=True), box(two, own=True)
+    indirect = a["Diffuse Indirect"] + b["Diffuse Indirect"]
+    assert np.abs(both["Diffuse Indirect"] - indirect).max() <= 1e-4 * indirect.max()
 
 
 def test_the_same_input_gives_the_same_picture_bit_for_bit(gl):

@@ -14,16 +14,17 @@ from gi_addon.settings import SettingError, Settings, markdown, walk
 
 # A value unlike the default for every setting, so that a new one without an entry fails here.
 OTHER = {
-    "technique": None, "use_indirect_diffuse": False, "use_glossy": False, "use_shadows": False, "use_ao": False,
+    "technique": None, "use_indirect_diffuse": False, "use_glossy": False, "share_reflections": False,
+    "use_shadows": False, "use_ao": False,
     "use_translucency": False, "use_volumetric": False, "use_area_lights": False, "samples": 3,
     "viewport_samples": None, "bounces": 0, "pixel_filter": "BLACKMAN_HARRIS", "filter_width": 3.0,
     "shadows.resolution": 64, "shadows.softness": 6.0, "ao.samples": 1, "ao.steps": 1, "ao.distance": 0.3,
     "ao.contact": 0.005, "world.samples": 1, "world.aimed": False, "world.rays": 4, "world.resolution": 64,
-    "rsm.resolution": 32, "rsm.samples": 7,
+    "rsm.resolution": 32, "rsm.samples": 7, "rsm.own_samples": True,
     "volume.samples": 2, "volume.density": 0.2, "volume.anisotropy": 0.5, "rsm.visibility": "NONE",
-    "rsm.visibility_resolution": 32,
+    "rsm.visibility_resolution": 32, "rsm.visibility_rays": 32,
     "gather_scale": 1, "motion_steps": None,
-    "lpv.resolution": 16, "lpv.iterations": 2, "lpv.directions": "48", "lpv.glossy_rays": 1, "lpv.occlusion": False,
+    "lpv.resolution": 16, "lpv.iterations": 2, "lpv.directions": "48", "lpv.occlusion": False,
 }  # fmt: skip
 # Not read by the picture itself: the viewport's own number of sub-frames; and effects whose techniques have yet to land.
 ELSEWHERE = {"viewport_samples", "motion_steps", "technique"}

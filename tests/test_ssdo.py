@@ -9,6 +9,7 @@ from conftest import make
 from gpu import evaluate
 
 from gi_addon.compare import scenes
+from gi_addon.compare.visible_light import light_unseen, visible_light
 from gi_addon.renderer import inspect
 from gi_addon.settings import Settings, walk
 
@@ -40,7 +41,7 @@ def test_sphere_one_bounce_is_the_share_of_lit_surface_on_screen(gl, lamp):
     """Stability test 1. In a sphere every patch lights every point alike, 1/(4πR²) per flux: what the screen shows of the
     flux is what a point gets of E₁ = ρΦ/(4πR²). g = share ± .03."""
     scene = scenes.integrating_sphere(albedo=0.5, power=100.0, light=lamp)
-    image = ssdo(scene, "Diffuse Indirect", samples=4).passes["Diffuse Indirect"][..., 0]
+    image = ssdo(scene, "Diffuse Indirect", samples=4, ssdo__margin=0.0).passes["Diffuse Indirect"][..., 0]
     g = image.mean() * np.pi / (0.5 * 100.0 / (4 * np.pi))
     assert g == pytest.approx(seen_share(scene.camera, sphere_hits(lamp)), abs=0.03)
 
@@ -134,7 +135,8 @@ def test_more_bounces_follow_the_geometric_series(gl, bounces):
     """Stability test 2 in its screen-space form: each bounce brings ρ × (share of the sphere on screen) of the one before."""
     scene = scenes.integrating_sphere(albedo=0.5, power=100.0)
     one, more = (
-        ssdo(scene, "Diffuse Indirect", samples=4, bounces=n).passes["Diffuse Indirect"].mean() for n in (1, bounces)
+        ssdo(scene, "Diffuse Indirect", samples=4, bounces=n, ssdo__margin=0.0).passes["Diffuse Indirect"].mean()
+        for n in (1, bounces)
     )
     ratio = 0.5 * seen_share(scene.camera, sphere_hits((0, 0, 0)))
     assert more / one == pytest.approx(sum(ratio**k for k in range(bounces)), abs=0.025)
@@ -287,9 +289,92 @@ def test_a_margin_brings_in_what_lies_just_outside(gl):
         return p[on][inside].mean()
 
     reference = wall(whole)
-    without, with_margin = wall(near), wall(near, ssdo__margin=1.0)
+    without, with_margin = wall(near, ssdo__margin=0.0), wall(near, ssdo__margin=1.0)
     assert without < 0.6 * reference
     assert with_margin == pytest.approx(reference, rel=0.1)
+
+
+def test_a_layer_behind_brings_in_what_something_hides(gl):
+    """A black card before the lit floor hides it from the camera, not from the wall above: with two layers the wall has the
+    floor's light by Lambert's polygon formula, 4 %; with one, what is hidden sends none."""
+    camera = scenes.perspective((0, -3.2, 0.6), (0, 0.3, 0.6), 0.9)
+    scene = corner(camera)
+    b = scenes.SceneBuilder()
+    card = np.array([[[-1.5, -1.02, -0.2], [1.5, -1.02, -0.2], [1.5, -1.02, 0.3], [-1.5, -1.02, 0.3]]])
+    b.quads(card, scenes.diffuse((0,) * 3))
+    b.quads(FLOOR[None], scenes.diffuse((0.8,) * 3))
+    b.quads(np.array([[[-1, 1, 0], [1, 1, 0], [1, 1, 1], [-1, 1, 1]]]), scenes.diffuse((0.8,) * 3))
+    b.light(scene.lights[0])
+    scene = b.build(camera)
+
+    def wall(layers):
+        image = ssdo(scene, "Diffuse Indirect", samples=8, gather_scale=1, ssdo__layers=layers).passes["Diffuse Indirect"][..., 0]
+        on, points = wall_points(camera, image.shape)
+        seen = points[:, 2] > 0.55  # above the card, as the camera sees it
+        expected = 0.8 * 5.0 / np.pi * polygon_irradiance(points, (0, -1, 0), FLOOR) / np.pi
+        return image[on][seen].sum() / expected[seen].sum()
+
+    one, two = wall(1), wall(2)
+    assert one < 0.5
+    assert two == pytest.approx(1.0, abs=0.04)
+
+
+def settings_of(**values) -> Settings:
+    settings = Settings()
+    for path, value in {"technique": "SSDO", **values}.items():
+        settings.set(path.replace("__", "."), value)
+    return settings
+
+
+def test_what_the_screen_knows_of_the_light_is_measured(gl):
+    """In the sphere each sender counts by its flux: known is the share of the lit surface that the picture shows, and nothing is
+    hidden. In the Cornell box a layer more knows more, and three with a margin know all but edges."""
+    scene = scenes.integrating_sphere(light=(0.0, 0.8, 0.0))
+    share = visible_light(scene, settings_of(ssdo__margin=0.0))
+    assert share.known == pytest.approx(seen_share(scene.camera, sphere_hits((0.0, 0.8, 0.0))), abs=0.03)
+    assert share.hidden < 0.01 and share.known + share.hidden + share.outside == pytest.approx(1.0)
+    one, two, three = (visible_light(scenes.cornell(), settings_of(ssdo__layers=n)).known for n in (1, 2, 3))
+    assert one + 0.1 < two < three - 0.05 and three > 0.97
+
+
+def test_what_is_missing_of_the_light_is_what_the_screen_does_not_know(gl):
+    """The black card of the layers' test: with one layer all of the wall's light is missing, and said to be."""
+    camera = scenes.perspective((0, -3.2, 0.6), (0, 0.3, 0.6), 0.9)
+    b = scenes.SceneBuilder()
+    card = np.array([[[-1.5, -1.02, -0.2], [1.5, -1.02, -0.2], [1.5, -1.02, 0.3], [-1.5, -1.02, 0.3]]])
+    b.quads(card, scenes.diffuse((0,) * 3))
+    b.quads(FLOOR[None], scenes.diffuse((0.8,) * 3))
+    b.quads(np.array([[[-1, 1, 0], [1, 1, 0], [1, 1, 1], [-1, 1, 1]]]), scenes.diffuse((0.8,) * 3))
+    b.light(scenes.sun_light((0, 0, -1), 5.0))
+    scene = b.build(camera)
+    one, two = (visible_light(scene, settings_of(ssdo__layers=n)) for n in (1, 2))
+    assert one.hidden > 0.95 and two.known > 0.95
+    lines = light_unseen(scene, settings_of(ssdo__layers=1))
+    assert lines[0] == one.text() and "ssdo.layers 3 it would be 0 %" in lines[1]
+
+
+def test_layers_know_how_thick_a_box_is(gl):
+    """With one layer the light around the boxes depends on how thick they are guessed to be; with two on nothing guessed."""
+    def light(layers, thickness):
+        return ssdo(scenes.cornell(), "Diffuse Indirect", samples=2, resolution=(64, 36), ssdo__layers=layers,
+                    ssdo__thickness=thickness).passes["Diffuse Indirect"]  # fmt: skip
+
+    apart = [np.abs(light(n, 0.02) - light(n, 1.0)).sum() / light(n, 0.02).sum() for n in (1, 2)]
+    assert apart[0] > 0.02 and apart[1] < 0.002, apart
+
+
+def test_one_layer_costs_nothing_of_the_others(gl):
+    """No pass and no texture of layers behind, nor with indirect light switched off."""
+    def titles(**values):
+        settings = Settings()
+        settings.set("technique", "SSDO")
+        for path, value in values.items():
+            settings.set(path.replace("__", "."), value)
+        return [p.title for p in inspect(scenes.cornell(), settings, resolution=(64, 36)).run]
+
+    assert not [t for t in titles(ssdo__layers=1) if "Layer" in t]
+    assert not [t for t in titles(ssdo__layers=3, use_indirect_diffuse=False) if "Layer" in t]
+    assert len([t for t in titles(ssdo__layers=3) if "Layer" in t]) == 6
 
 
 def test_a_margin_leaves_the_picture_where_it_was(gl):
@@ -391,8 +476,8 @@ def test_every_pass_is_finite_whatever_the_scene(gl, sources):
 
 OTHER = {
     "ssdo.samples": 64, "ssdo.steps": 4, "ssdo.radius": 0.2, "ssdo.thickness": 0.02,
-    "ssdo.margin": 0.25, "ssdo.sources": "SCREEN", "ssdo.occlusion": "BITMASK", "ssdo.shadows": "SCREEN",
-    "ssdo.contact": 0.5, "ssdo.volumetric": "RADIAL",
+    "ssdo.margin": 0.0, "ssdo.sources": "SCREEN", "ssdo.occlusion": "BITMASK", "ssdo.shadows": "SCREEN",
+    "ssdo.contact": 0.5, "ssdo.volumetric": "RADIAL", "ssdo.layers": 1,
 }  # fmt: skip
 
 
@@ -400,7 +485,8 @@ OTHER = {
 def test_every_setting_of_the_technique_changes_the_picture(gl, path):
     scene = scenes.cornell()
     scene.world = scenes.world((0.3, 0.4, 0.5))
-    on = {"volume__density": 0.05} if path == "ssdo.volumetric" else {"ssdo__shadows": "CONTACT"} if "contact" in path else {}
+    on = {"ssdo.volumetric": {"volume__density": 0.05}, "ssdo.contact": {"ssdo__shadows": "CONTACT"},
+          "ssdo.thickness": {"ssdo__layers": 1}}.get(path, {})  # fmt: skip
     a, b = (
         ssdo(scene, "Combined", "Ambient Occlusion", samples=2, resolution=(64, 36), **on, **s).passes
         for s in ({}, {path.replace(".", "__"): OTHER[path]})

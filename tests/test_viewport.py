@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import time
 import types
 
 import numpy as np
@@ -144,6 +145,162 @@ def steps():
     report(**out)
 """
 
+# What users do without waiting for the picture: each of these comes while the GL thread is at work for the viewport.
+_HASTE = """
+def steps():
+    from gi_addon.gl import shared
+    from gi_addon.host import status, viewport
+    out, path = {}, {folder!r} + "/saved.blend"
+    scene = studio()
+    scene.quartet.viewport_samples = 64
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    area, space, region = view()
+    window = bpy.context.window_manager.windows[0]
+    space.shading.type = "RENDERED"
+    yield 0.3
+    def here():
+        return bpy.context.temp_override(window=window, area=area, region=region)
+    def at_work():
+        return any(v._job is not None and not v._job.done() for v in viewport.viewports())
+    def picture():
+        return any(v._picture is not None and v._picture.request.key == v._request.key for v in viewport.viewports())
+    def state():
+        return dict(viewports=len(viewport.viewports()), bytes=shared().call(lambda gl: gl.bytes()), problem=status.problem())
+    def instances():
+        return sorted(len(v._scene.instances) for v in viewport.viewports())
+    yield picture
+    # A file is opened, twice, while sub-frames are in the making.
+    for _ in range(2):
+        yield at_work
+        bpy.ops.wm.open_mainfile(filepath=path, load_ui=False)
+        yield 0.2
+        yield picture
+    out["file opened"] = dict(state(), instances=instances())
+    # Engines are switched faster than any of them renders.
+    scene = bpy.context.scene
+    for engine in ("BLENDER_WORKBENCH", "QUARTET", "CYCLES", "QUARTET", "BLENDER_WORKBENCH"):
+        scene.render.engine = engine
+        yield 0.1
+    yield 0.5
+    out["engines switched"] = state()
+    scene.render.engine = "QUARTET"
+    yield 0.2
+    yield at_work
+    # The viewport becomes another editor and comes back.
+    area.type = "IMAGE_EDITOR"
+    yield 0.5
+    out["another editor"] = state()
+    area.type = "VIEW_3D"
+    area, space, region = view()
+    space.shading.type = "RENDERED"
+    yield 0.2
+    yield picture
+    # A second viewport, and a final render meanwhile; then what they all show is deleted.
+    with here():
+        bpy.ops.screen.area_split(direction="VERTICAL", factor=0.5)
+    for a in window.screen.areas:
+        if a.type == "VIEW_3D":
+            a.spaces.active.shading.type = "RENDERED"
+    yield 0.3
+    ended = []
+    bpy.app.handlers.render_complete.append(lambda *_: ended.append(True))
+    scene.render.resolution_x, scene.render.resolution_y, scene.quartet.samples = 160, 90, 16
+    bpy.ops.render.render("INVOKE_DEFAULT")
+    scene.objects["White"].location.x += 0.1
+    yield at_work
+    mesh = bpy.data.objects["White"].data
+    bpy.data.objects.remove(bpy.data.objects["White"])
+    bpy.data.meshes.remove(mesh)
+    bpy.data.materials.remove(bpy.data.materials["White"])
+    def rendered():
+        return bool(ended)
+    yield rendered
+    yield 0.2
+    yield picture
+    out["deleted"] = dict(state(), instances=instances())
+    # Undo and redo faster than pictures come.
+    scene = bpy.context.scene
+    with here():
+        bpy.ops.ed.undo_push(message="zero")
+        for k in range(3):
+            scene.objects["Red"].location.z += 0.5
+            bpy.ops.ed.undo_push(message=f"raised {k}")
+    for k in range(12):
+        yield at_work
+        with here():
+            bpy.ops.ed.undo() if k % 2 == 0 else bpy.ops.ed.redo()
+        yield 0.05
+    with here():
+        bpy.ops.ed.undo()
+    yield 0.2
+    yield picture
+    out["undone"] = dict(state(), instances=instances(),
+        top=[float(v._scene.bounds()[1][2]) for v in viewport.viewports()])
+    gi_addon.unregister()
+    yield 0.3
+    out["unregistered"] = len(viewport.viewports())
+    report(**out)
+"""
+
+# Changes and undos by the hundred; resident memory of Blender and bytes and objects on the GPU on the way.
+_MEMORY = """
+def steps():
+    from gi_addon.gl import shared
+    from gi_addon.host import viewport
+    scene = studio()
+    scene.quartet.viewport_samples = 1
+    area, space, region = view()
+    window = bpy.context.window_manager.windows[0]
+    space.shading.type, space.region_3d.view_perspective = "RENDERED", "CAMERA"
+    yield 0.3
+    yield settled
+    v = viewport.viewports()[0]
+    def memory():
+        import gc
+        gc.collect()
+        with open("/proc/self/statm") as file:
+            rss = int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+        gl = shared().call(lambda gl: (gl.bytes(), len(gl.resources())))
+        return dict(rss=rss, gl=gl[0], objects=gl[1])
+    def here():
+        return bpy.context.temp_override(window=window, area=area, region=region)
+    def shown():
+        return not v._dirty and v._picture.request.key == v._request.key
+    changes, undos = {}, {}
+    box = scene.objects["White"]
+    for i in range(1, {changes!r} + 1):
+        box.location.x = 0.3 + 0.2 * (i % 10) / 10.0
+        if i % 3 == 0:
+            node = bpy.data.materials["White"].node_tree.nodes["Principled BSDF"]
+            node.inputs["Roughness"].default_value = (i % 17) / 17.0
+        if i % 5 == 0:
+            box.data.vertices[0].co.x = -0.5 - 0.01 * (i % 4)
+            box.data.update()
+        if i % 7 == 0:
+            bpy.data.lights["Spot"].energy = 400.0 + i % 11
+        yield 0.01
+        yield shown
+        if i in {marks!r}:
+            yield settled
+            changes[i] = memory()
+    for i in range(1, {undos!r} + 1):
+        with here():
+            if i % 2:
+                bpy.data.objects["White"].location.z += 0.01
+                bpy.ops.ed.undo_push(message="raised")
+            else:
+                bpy.ops.ed.undo()
+                if i % 4 == 0:
+                    bpy.ops.ed.redo()
+                    bpy.ops.ed.undo()
+        yield 0.01
+        yield shown
+        if i in {undo_marks!r}:
+            yield settled
+            undos[i] = memory()
+    report(changes=changes, undos=undos, counts=dict(v.counts))
+"""
+
 # Squares that shine by themselves, in Quartet and in Cycles under the same view transforms.
 _COLORS = """
 COLORS = {colors!r}
@@ -278,6 +435,60 @@ def test_memory_stays_flat_and_is_given_back(session):
     assert session["default cube"] == 1 and session["unregistered"] == 0
 
 
+@pytest.fixture(scope="module")
+def haste(tmp_path_factory):
+    """The report of a session whose user never waits."""
+    folder = tmp_path_factory.mktemp("haste")
+    return run_window(_HASTE.replace("{folder!r}", repr(str(folder))), folder, size="640x440")
+
+
+@pytest.mark.realblender
+def test_opening_a_file_while_the_viewport_renders_shows_that_file(haste):
+    assert haste["file opened"]["viewports"] == 1 and haste["file opened"]["instances"] == [3]
+    assert not haste["file opened"]["problem"]
+
+
+@pytest.mark.realblender
+def test_engines_and_editors_switched_while_it_renders_free_everything(haste):
+    """Five switches within half a second, and a viewport that becomes an Image Editor, both amid sub-frames."""
+    for after in ("engines switched", "another editor"):
+        assert haste[after]["viewports"] == haste[after]["bytes"] == 0, (after, haste[after])
+
+
+@pytest.mark.realblender
+def test_deleting_what_two_viewports_and_a_final_render_show(haste):
+    """Object, mesh and material go while all three are at it; both viewports show the two boxes that are left."""
+    assert haste["deleted"]["instances"] == [2, 2] and not haste["deleted"]["problem"]
+
+
+@pytest.mark.realblender
+def test_undo_and_redo_faster_than_pictures_end_in_the_right_one(haste):
+    """Three times raised by .5, undone and redone six times, undone once: 2 + 2 · .5 high, in both viewports."""
+    assert haste["undone"]["top"] == pytest.approx([3.0, 3.0], abs=1e-5)
+    assert haste["unregistered"] == 0
+
+
+def memory_session(folder, changes: int, undos: int, marks: int) -> dict:
+    """Memory after each of ``marks`` equal parts of so many changes, and undos."""
+    steps = _MEMORY.replace("{changes!r}", repr(changes)).replace("{undos!r}", repr(undos))
+    steps = steps.replace("{marks!r}", repr({changes * k // marks for k in range(1, marks + 1)} | {min(20, changes)}))
+    steps = steps.replace("{undo_marks!r}", repr({undos * k // marks for k in range(1, marks + 1)}))
+    return run_window(steps, folder, size="320x240", timeout=3000)
+
+
+@pytest.mark.slow
+@pytest.mark.realblender
+def test_memory_is_flat_over_1000_changes_and_100_undos(tmp_path):
+    """Nothing is left on the GPU, to the byte; Blender's process grows by less than 8 MB, of which Blender's own share under
+    Workbench is 5 (docs/blender.md)."""
+    answer = memory_session(tmp_path, 1000, 100, 5)
+    for kind in ("changes", "undos"):
+        rows = list(answer[kind].values())
+        print(kind, {k: (round(v["rss"] / 1e6, 1), v["gl"], v["objects"]) for k, v in answer[kind].items()})
+        assert len({row["gl"] for row in rows}) == 1 and len({row["objects"] for row in rows}) == 1
+        assert rows[-1]["rss"] - rows[0]["rss"] < 8e6
+
+
 @pytest.mark.realblender
 @pytest.mark.parametrize("backend", ["opengl", "vulkan"])
 def test_colours_are_cycles_own(tmp_path, backend):
@@ -327,6 +538,59 @@ def test_a_perspective_view_keeps_its_clip_planes(blender):
     window[2, 3], window[3, 2] = -2.0 * far * near / (far - near), -1.0
     camera = view_camera(_free_view(np.eye(4), window, "PERSP"), scenes.cornell(), (64, 36))
     assert (camera.clip_start, camera.clip_end) == (pytest.approx(near), pytest.approx(far, rel=1e-4))
+
+
+@pytest.mark.blender
+@pytest.mark.parametrize("technique", ["RSM", "LPV", "VCT", "SSDO"])
+def test_a_coarse_picture_makes_no_map_of_the_full_one_again(blender, gl, technique):
+    """Passes that run only when stale: none of them runs again when the full resolution follows the coarse picture."""
+    from gi_addon.host.viewport import coarse
+
+    scene, settings = scenes.cornell(), Settings()
+    settings.technique, settings.bounces, settings.samples = technique, 2, 2
+    settings.lpv.resolution, settings.vct.resolution, settings.rsm.resolution = 16, 32, 64
+    less = coarse(settings, 4)
+    assert coarse(settings, 1) == settings and less.world.rays == settings.world.rays // 4
+    assert less.rsm.samples == settings.rsm.samples and less.ssdo.samples == settings.ssdo.samples // 4
+
+    def job(context):
+        renderer = Renderer(context)
+        try:
+            renderer.timers.enabled = True
+            renderer.begin(scene, less, resolution=(16, 9))
+            renderer.subframe(0)
+            renderer.timers.reset()
+            plan = renderer.begin(scene, settings, resolution=(64, 36))
+            renderer.subframe(0)
+            static = {p.title for p in plan.run if p.task.rate(plan.facts) == "static"}
+            return static, static & set(renderer.timers.collect())
+        finally:
+            renderer.close()
+
+    static, again = gl(job)
+    assert static and not again
+
+
+@pytest.mark.blender
+def test_the_full_resolution_waits_until_the_coarse_picture_has_been_seen(blender):
+    """A coarse picture that took a second comes long after its change: the full one still waits .15 s more, so that the next
+    change of a drag does not find the GL thread in a long pass."""
+    from gi_addon.host import viewport
+
+    class Engine:
+        pass
+
+    engine, now = Engine(), time.monotonic()
+    view = viewport.Viewport(engine)
+    try:
+        request = viewport.Request(("key",), None, Settings(), None, (64, 36), (0, 0, 64, 36), False, scale=4)
+        view._request, view._changed, view._pictured = request, now - 1.0, now
+        view._picture = viewport.Picture(request, 1, np.zeros((9, 16, 4), "f4"), 0.9, None)
+        assert not view._due()
+        view._pictured = now - 0.2
+        assert view._due()
+    finally:
+        viewport._live.discard(view)
 
 
 def test_a_sub_frame_given_up_half_way_leaves_no_stale_maps(gl):

@@ -20,6 +20,7 @@ from .stability import TRAITS, Suite, Traits
 from .studio import Studio, has_setting, without_pass
 from .study import interval
 from .sweeps import AXES
+from .visible_light import light_unseen
 
 # What counts as a difference: of the error, and of a frame's time, relative.
 TOLERANCE, TIME_TOLERANCE = 0.02, 0.10
@@ -256,7 +257,7 @@ def certify(
     wall = float(np.percentile(thickness, 5)) if thickness.size else None
     limit, leak = _wall_limit(settings)
     out.choices = closed_forms(scene, settings, plan, color, wall, limit)
-    out.failures = predictions(scene, settings, color, wall, limit, leak, s)
+    out.failures = predictions(scene, settings, color, wall, limit, leak, s, size)
     return out
 
 
@@ -307,8 +308,9 @@ def _wall_limit(settings: Settings) -> tuple[float | None, float]:
 
 
 def predictions(
-    scene: Scene, settings: Settings, color: np.ndarray, wall: float | None, limit: float | None, leak: float, s: Score
-) -> list[str]:
+    scene: Scene, settings: Settings, color: np.ndarray, wall: float | None, limit: float | None, leak: float, s: Score,
+    size: tuple[int, int],
+) -> list[str]:  # fmt: skip
     """Where this technique must be expected to fail on this scene, each with its reason."""
     traits = TRAITS.get(settings.technique, Traits())
     out = []
@@ -328,7 +330,7 @@ def predictions(
         if wall / cell < limit:
             out.append(f"walls of {wall:.3g} m are {wall / cell:.2g} cells thick and leak below w* = {limit:g} cells")
     if traits.screen_space:
-        out.append("light from outside the picture and from hidden surfaces is missing (stability test 9)")
+        out += light_unseen(scene, settings, size)
     if s.rel_mse > s.constant:
         out.append(
             f"on this scene it is worse than one constant colour (relMSE {number(s.rel_mse)} against {number(s.constant)})"

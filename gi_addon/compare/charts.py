@@ -53,7 +53,7 @@ def points_of(record: dict, component: str, reference: str, metric: str) -> list
     and so do candidates with more bounces: one bounce is no reference for them."""
     out = []
     for c in record["candidates"]:
-        if reference == "R1" and (not c["technique"] or c["options"].get("bounces", 1) > 1):
+        if reference == "R1" and (not c["technique"] or c["bounces"] > 1):
             continue
         s = c["scores"].get(component, {}).get(reference)
         if s is not None and s.get(metric) is not None and math.isfinite(s[metric]):

@@ -49,9 +49,12 @@ def hits(origin: np.ndarray, direction: np.ndarray, corner: np.ndarray, u: np.nd
     return np.where(inside, distance, np.inf), s, t
 
 
-def visible_share(camera: Camera, radius: float, power: float, lamp: np.ndarray, count: int = 200_000) -> float:
+def visible_share(
+    camera: Camera, radius: float, power: float, lamp: np.ndarray, count: int = 200_000, beyond: tuple[float, float] = (0.0, 0.0)
+) -> float:
     """Share of the flux reflected inside a sphere that leaves from where the camera looks: by symmetry the share of the
-    one-bounce irradiance that a screen-space method can know of. Quadrature over a Fibonacci sphere."""
+    one-bounce irradiance that a screen-space method can know of. ``beyond`` is what it draws on each side of the picture, as
+    shares of its width and height. Quadrature over a Fibonacci sphere."""
     i = np.arange(count) + 0.5
     z = 1.0 - 2.0 * i / count
     phi = np.pi * (1.0 + 5.0**0.5) * i
@@ -64,5 +67,5 @@ def visible_share(camera: Camera, radius: float, power: float, lamp: np.ndarray,
         np.concatenate([points, np.ones((count, 1))], -1)
         @ (np.asarray(camera.clip_from_view, "f8") @ np.linalg.inv(np.asarray(camera.world_from_view, "f8"))).T
     )
-    seen = (clip[:, 3] > 0) & (np.abs(clip[:, :2]) <= clip[:, 3:]).all(-1)
+    seen = (clip[:, 3] > 0) & (np.abs(clip[:, :2]) <= clip[:, 3:] * (1.0 + 2.0 * np.asarray(beyond))).all(-1)
     return float(direct[seen].sum() / direct.sum())

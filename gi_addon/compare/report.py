@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from .. import presets
 from . import charts
 from .metrics import error_map
 from .page import bytes_uri, chart, data_uri, document, esc, heat, number, table, wall, wall_script
@@ -126,6 +127,36 @@ def yardstick(record: dict) -> list[list]:
     return rows
 
 
+def preset_rows(record: dict) -> list[list]:
+    """Per technique and preset: its time in units of Cycles at 1 sample with OpenImageDenoise, its error, and what both are
+    meant to be: PREVIEW below the best constant, BALANCED and FINAL no worse than Cycles at 1 and 4 samples, denoised."""
+    points = charts.points_of(record, "Combined", "Rinf", "rel_mse")
+    denoised = {p["options"].get("samples"): p for p in points if p["method"] == "Cycles + OIDN"}
+    own = [p for p in points if p["options"].get("preset") in presets.SHARES]
+    if not own or 1 not in denoised:
+        return []
+    limits = {
+        "PREVIEW": (own[0]["score"]["constant"], "best constant"),
+        "BALANCED": (denoised[1]["y"], "Cycles 1 spp + OIDN"),
+        "FINAL": (denoised[4]["y"] if 4 in denoised else None, "Cycles 4 spp + OIDN"),
+    }
+
+    def judged(value: float, limit: float | None) -> str:
+        return f"<span class={'ok' if limit is None or value <= limit else 'fail'}>{number(value)}</span>"
+
+    rows: list[list] = []
+    for p in own:
+        preset = p["options"]["preset"]
+        times = p["x"] / denoised[1]["x"]
+        limit, whose = limits[preset]
+        rows.append([
+            p["method"], presets.PRESETS[preset].label, f"{number(p['x'])} ms", judged(times, presets.SHARES[preset]) + " ×",
+            f"≤ {presets.SHARES[preset]:g} ×", judged(p["y"], limit),
+            f"≤ {number(limit)} ({whose})" if limit is not None else f"{whose} was not measured", number(p["score"]["gain"]),
+        ])  # fmt: skip
+    return rows
+
+
 def figures(scenes: list[Measured]) -> dict[str, object]:
     """Every chart by a file name."""
     out: dict[str, object] = {}
@@ -169,6 +200,13 @@ def _scene_html(index: int, scene: Measured, drawn: dict[str, object]) -> tuple[
             "<h3>Within the time of Cycles at 1 sample with OpenImageDenoise</h3><p class=quiet>The least relMSE of Combined "
             "against R∞ that each method reaches in that share of the time.</p>",
             table(["method", "time", "≤ ¼ ×", "≤ 1 ×", "≤ 4 ×"], rows),
+        ]
+    rows = preset_rows(record)
+    if rows:
+        parts += [
+            "<h3>Presets</h3><p class=quiet>Time as a multiple of Cycles at 1 sample with OpenImageDenoise and relMSE of "
+            "Combined against R∞, each beside what the preset is meant for.</p>",
+            table(["technique", "preset", "time", "×", "meant", "relMSE", "meant", "gain"], rows),
         ]
     methods = list(dict.fromkeys(c["method"] for c in record["candidates"]))
     volumes = []

@@ -108,6 +108,12 @@ def _moved(scene: Scene, *, aim=(0.0, 0.3, 0.35), eye=(0.0, 3.0, 1.7), shift=(0.
 # --- 1 … 4: energy --------------------------------------------------------------------------------------------------
 
 
+def _beyond(suite: Suite) -> tuple[float, float]:
+    """What screen space draws beyond the picture's sides, as shares of its width and height."""
+    pixels = round(float(suite.settings().ssdo.margin) * max(suite.size))
+    return pixels / suite.size[0], pixels / suite.size[1]
+
+
 @test("1", "Integrating sphere", "g = mean E / (ρΦ/(4πR²)); CV of E")
 def sphere(suite: Suite) -> Finding:
     """One bounce in a diffuse sphere lights every point alike, wherever the lamp is; screen space gets the visible share."""
@@ -119,7 +125,7 @@ def sphere(suite: Suite) -> Finding:
         g = image / (0.5 * 100.0 / (4 * np.pi))
         label = f"lamp at {lamp}"
         if suite.traits.screen_space:
-            share = visible_share(scene.camera, 1.0, 100.0, np.array(lamp))
+            share = visible_share(scene.camera, 1.0, 100.0, np.array(lamp), beyond=_beyond(suite))
             out.quantities.append(within(f"g, {label} (visible share {share:.3f})", g.mean(), share - 0.03, share + 0.03))
         else:
             out.quantities.append(within(f"g, {label}", g.mean(), 1 - limit, 1 + limit))
@@ -141,7 +147,7 @@ def bounces(suite: Suite) -> Finding:
         measured.append(0.5 * float(image.mean()) / (100.0 / (4 * np.pi)))
         expected = 0.5 * (1.0 - 0.5**depth)
         if suite.traits.screen_space:
-            share = visible_share(scene.camera, 1.0, 100.0, np.zeros(3))
+            share = visible_share(scene.camera, 1.0, 100.0, np.zeros(3), beyond=_beyond(suite))
             expected = 0.5 * sum(0.5**k * share**k for k in range(1, depth + 1))
         out.quantities.append(within(f"L, {depth} bounce{'s' * (depth > 1)}", measured[-1], expected - 0.025, expected + 0.025))
     if high == 1:
@@ -640,13 +646,15 @@ def linearity(suite: Suite) -> Finding:
         difference = np.abs(a[name][..., :3] * 1e3 - b[name][..., :3]).max() / max(b[name][..., :3].max(), 1e-12)
         out.quantities.append(at_most(f"{name}, power × 1000", difference, 1e-3))
 
-    def box(*lights):
+    def box(*lights, **values):
         scene = scenes.cornell(blocks=False)
         scene.lights = list(lights)
-        return suite.render(scene, "Diffuse Direct", "Diffuse Indirect", samples=64 if suite.full else 8, use_ao=False).passes
+        samples = 64 if suite.full else 8
+        return suite.render(scene, "Diffuse Direct", "Diffuse Indirect", samples=samples, use_ao=False, **values).passes
 
     one, two = scenes.point_light((-0.4, 0, 1.5), 40.0), scenes.spot_light((0.3, 0, 1.9), (0, 0, 0), 90.0, 1.4, 0.3)
-    both, first, second = box(one, two), box(one), box(two)
+    own = {suite.traits.own.replace(".", "__"): True} if suite.traits.own else {}
+    both, first, second = box(one, two, **own), box(one, **own), box(two, **own)
     total = first["Diffuse Direct"] + second["Diffuse Direct"]
     out.quantities.append(at_most("two lights, direct, max", np.abs(both["Diffuse Direct"] - total).max() / total.max(), 1e-3))
     indirect = first["Diffuse Indirect"].mean() + second["Diffuse Indirect"].mean()
@@ -655,8 +663,9 @@ def linearity(suite: Suite) -> Finding:
     )
     for title, passes in (("one light", first), ("the other", second), ("both", both)):
         out.pictures[f"{title}, indirect"] = passes["Diffuse Indirect"][..., :3] / max(both["Diffuse Indirect"].max(), 1e-12)
-    if suite.traits.set == "rsm.samples":
-        out.nature = "both lights share one set of virtual lights: each alone draws another, equal up to its noise"
+    if own:
+        shared = box(one, two)["Diffuse Indirect"].mean()
+        out.quantities.append(reported(f"the same without {suite.traits.own}", abs(shared / max(indirect, 1e-12) - 1.0)))
     return out
 
 

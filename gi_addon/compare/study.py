@@ -257,8 +257,9 @@ def scene_record(
     runs: list[Run],
     references: dict[str, Halves],
     triangles: int,
+    base: Settings | None = None,
 ) -> dict:
-    """All figures of one scene as plain data."""
+    """All figures of one scene as plain data. ``base`` are the settings that the candidates change."""
     return {
         "scene": name,
         "key": scene_key,
@@ -271,6 +272,7 @@ def scene_record(
                 "technique": not r.candidate.peer,
                 "label": r.candidate.label,
                 "options": dict(r.candidate.options),
+                "bounces": None if r.candidate.peer else r.candidate.settings(base).bounces,
                 "ms": r.ms,
                 "mad": r.mad,
                 "p95": r.p95,

@@ -6,6 +6,7 @@ from __future__ import annotations
 import itertools
 from dataclasses import dataclass
 
+from .. import presets
 from ..settings import Settings, walk
 from .studio import has_setting, settings_for
 
@@ -14,16 +15,20 @@ AXES: dict[str, dict[str, tuple]] = {
     "RSM": {"rsm.samples": (50, 200, 800), "gather_scale": (4, 1), "rsm.visibility": ("CELLS", "NONE"), "bounces": (1, 3)},
     "LPV": {"lpv.resolution": (16, 32, 64), "lpv.directions": ("48", "72"), "bounces": (1, 3)},
     "VCT": {"vct.resolution": (32, 64, 128), "vct.cones": (6, 16), "bounces": (1, 3)},
-    "SSDO": {"ssdo.samples": (64, 256), "ssdo.steps": (16, 32), "gather_scale": (4, 1), "bounces": (1, 3)},
+    "SSDO": {"ssdo.samples": (64, 256), "ssdo.steps": (16, 32), "ssdo.layers": (1, 2, 3), "gather_scale": (4, 1),
+             "bounces": (1, 3)},
 }
-SUBFRAMES = {"none": (), "samples": (1, 4), "quick": (1, 4, 16), "full": (1, 2, 4, 8, 16, 32, 64)}
-CYCLES_SAMPLES = {"none": (1, 16), "samples": (1, 4, 16), "quick": (1, 4, 16, 64), "full": (1, 2, 4, 8, 16, 32, 64)}
-EEVEE_SAMPLES = {"none": (16,), "samples": (1, 16), "quick": (1, 16), "full": (1, 4, 16, 64)}
+SUBFRAMES = {"none": (), "presets": (), "samples": (1, 4), "quick": (1, 4, 16), "full": (1, 2, 4, 8, 16, 32, 64)}
+CYCLES_SAMPLES = {
+    "none": (1, 16), "presets": (1, 4), "samples": (1, 4, 16), "quick": (1, 4, 16, 64), "full": (1, 2, 4, 8, 16, 32, 64),
+}  # fmt: skip
+EEVEE_SAMPLES = {"none": (16,), "presets": (1, 4), "samples": (1, 16), "quick": (1, 16), "full": (1, 4, 16, 64)}
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """A point of the chart: a technique with settings, or a peer with options (``samples``, ``denoise``, ``raytracing``)."""
+    """A point of the chart: a technique with settings (by their names, or a ``preset``), or a peer with options (``samples``,
+    ``denoise``, ``raytracing``)."""
 
     method: str
     options: tuple[tuple[str, object], ...]
@@ -44,7 +49,10 @@ class Candidate:
         settings = base.copy() if base else settings_for(self.method)
         settings.set("technique", self.method)
         for name, value in self.options:
-            settings.set(name, value)
+            if name == "preset":
+                presets.apply(settings, value)
+            else:
+                settings.set(name, value)
         return settings
 
 
@@ -53,10 +61,11 @@ def _candidate(method: str, options: dict) -> Candidate:
 
 
 def technique_sweep(technique: str, sweep: str) -> list[Candidate]:
-    """``none``: the scene's own settings; ``samples``: sub-frames; ``quick``: those, and each axis alone at 4 sub-frames;
-    ``full``: all combinations of the axes at every number of sub-frames."""
+    """``none``: the scene's own settings; ``presets``: our own three; ``samples``: those and sub-frames; ``quick``: those, and
+    each axis alone at 4 sub-frames; ``full``: all combinations of the axes at every number of sub-frames."""
     if sweep == "none":
         return [Candidate(technique, ())]
+    offered = [_candidate(technique, {"preset": name}) for name in presets.SHARES]
     subframes = SUBFRAMES[sweep]
     default = Settings()
     limits = {path: meta for path, _, meta in walk()}
@@ -73,7 +82,7 @@ def technique_sweep(technique: str, sweep: str) -> list[Candidate]:
         for n, *values in itertools.product(subframes, *axes.values()):
             changed = {k: v for k, v in zip(axes, values, strict=True) if v != default.get(k)}
             found.append(_candidate(technique, {"samples": n, **changed}))
-    return list(dict.fromkeys(found))
+    return list(dict.fromkeys(found + offered))
 
 
 def peer_sweep(peer: str, sweep: str) -> list[Candidate]:

@@ -8,7 +8,6 @@ the scene's geometry, and looked up at each pixel.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import permutations, product
 
 import moderngl
@@ -18,16 +17,17 @@ from ..facts import Facts
 from ..frame import Frame
 from ..gpu_types import LIGHT_AREA, LIGHT_SUN, LIGHT_WORLD
 from ..graph import Buffer, Optional, Pass, Planned, Texture, Uniform
+from ..nested_grids import MOST_GRIDS, Grid, grids_needed, nested_grids
 from ..passes.ao import AOBlur
 from ..passes.brdf_tables import BRDFTables
 from ..passes.direct_lighting import DirectLighting, TranslucentLighting
 from ..passes.gbuffer import GBuffer, TranslucentBack, TranslucentLayer, TranslucentTint
 from ..passes.lights import LightList, RSMGeneration, ShadowMaps
 from ..passes.occupancy import CELL_UNIFORMS, Occupancy, set_cells
+from ..passes.reflections import GLOSSY_RAY, GLOSSY_TRACED, reflection_sharing
 from ..passes.resolve import Resolve
 from ..passes.screen import (
     INDIRECT_DIFFUSE,
-    INDIRECT_GLOSSY,
     LOBE,
     REFRACTING,
     TRANSMISSION_INDIRECT,
@@ -85,6 +85,7 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         Subsurface(),
         TranslucentLighting(),
         GlossyLighting(),
+        *reflection_sharing(settings),
         Refraction(),
         Volumetric(),
         Resolve(layers),
@@ -94,51 +95,82 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
 # --- the grid ---------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Grid:
-    """Cubic cells over the scene: ``origin`` (3,) of cell 0's low corner and ``cell`` edge, m; ``size`` (3,) cells."""
+def grid_count(facts: Facts) -> int:
+    """Grids within each other. Iterations are cells of one grid."""
+    chosen = facts.settings.lpv
+    if chosen.iterations:
+        return 1
+    return grids_needed(facts.focus, chosen.resolution) if chosen.cascades == "AUTO" else int(chosen.cascades)
 
-    origin: tuple[float, float, float]
-    cell: float
-    size: tuple[int, int, int]
 
-    @staticmethod
-    def over(bounds: np.ndarray, resolution: int) -> Grid:
-        """The grid of ``resolution`` cells along the longest side of ``bounds`` (2, 3), one of padding at each end."""
-        low, high = np.asarray(bounds, "f8")
-        extent = np.maximum(high - low, 0.0)
-        longest = float(extent.max()) or 1.0
-        cell = longest / (resolution - 2)
-        # A side of a whole number of cells must not gain one from rounding.
-        size = np.ceil(extent / cell - 1e-6).astype(int) + 2
-        origin = (low + high) / 2.0 - size * cell / 2.0
-        return Grid(tuple(float(v) for v in origin), cell, tuple(int(v) for v in size))
-
-    @property
-    def cells(self) -> int:
-        return int(np.prod(self.size))
+def grids(facts: Facts) -> list[Grid]:
+    """The frame's grids, the outermost first."""
+    return nested_grids(facts.focus, facts.settings.lpv.resolution, grid_count(facts), facts.eye)
 
 
 def grid(facts: Facts) -> Grid:
-    """The frame's grid."""
-    return Grid.over(facts.rig.region, facts.settings.lpv.resolution)
+    """The frame's outermost grid, over all of the scene."""
+    return grids(facts)[0]
+
+
+def _size(facts: Facts, layers: int) -> tuple[int, int, int]:
+    """Texels of a volume of all grids, side by side along x, with so many values a cell, one behind the other along z."""
+    every = grids(facts)
+    return sum(g.size[0] for g in every), max(g.size[1] for g in every), max(g.size[2] for g in every) * layers
 
 
 def _sh_size(facts: Facts) -> tuple[int, int, int]:
-    nx, ny, nz = grid(facts).size
-    return nx, ny, nz * SH_COUNT
+    return _size(facts, SH_COUNT)
+
+
+def _cells(facts: Facts) -> int:
+    return sum(g.cells for g in grids(facts))
+
+
+def _most_cells(facts: Facts) -> int:
+    return max(g.cells for g in grids(facts))
 
 
 _GRID = (
     Uniform("grid_origin", "vec3", "low corner of the grid, world space, m"),
     Uniform("grid_cell", "float", "edge of a cell, m"),
     Uniform("grid_size", "ivec3", "cells along each axis"),
+    Uniform("grid_column", "int", "where the grid's cells begin along x in textures"),
+    Uniform("grid_first", "int", "where they begin in buffers"),
+    Uniform("grid_rim", "int", "bit 2·axis for the low, 2·axis + 1 for the high side that the grid around it goes on behind"),
 )
 
 
-def _set_grid(frame: Frame, program, facts: Facts, **more) -> None:
-    g = grid(facts)
-    frame.set(program, grid_origin=g.origin, grid_cell=g.cell, grid_size=g.size, **more)
+def _set_grid(frame: Frame, program, g: Grid, **more) -> None:
+    frame.set(
+        program, grid_origin=g.origin, grid_cell=g.cell, grid_size=g.size, grid_column=g.column, grid_first=g.first,
+        grid_rim=g.rim, **more,
+    )  # fmt: skip
+
+
+# What looks light up chooses among the grids at each point (lookup of lpv_lib.glsl).
+_GRIDS = (
+    Uniform("grid_places", "mat4", "a column per grid, the outermost first: low corner, world space, and edge of a cell, m"),
+    Uniform("grid_sizes", "mat4", "cells along each axis; where the grid's cells begin along x in textures"),
+    Uniform("grid_bounds", "mat4", "where its cells begin in buffers; its rim"),
+)
+
+
+def _set_grids(frame: Frame, program, facts: Facts, **more) -> None:
+    places, sizes, bounds = (np.zeros((MOST_GRIDS, 4), "f4") for _ in range(3))
+    for k, g in enumerate(grids(facts)):
+        places[k], sizes[k], bounds[k, :2] = (*g.origin, g.cell), (*g.size, g.column), (g.first, g.rim)
+    frame.set(program, grid_places=places, grid_sizes=sizes, grid_bounds=bounds, **more)
+
+
+def _defines(facts: Facts, *, chooses: bool = False) -> dict[str, int]:
+    """``LPV_GRIDS``, how many there are, and ``LPV_CHOOSES``: whether a shader chooses among them."""
+    return {"LPV_GRIDS": grid_count(facts), "LPV_CHOOSES": int(chooses)}
+
+
+def _place(facts: Facts) -> tuple:
+    """Where the camera has put the grids."""
+    return tuple(g.low for g in grids(facts))
 
 
 _AIR_SETTINGS = ("use_volumetric", "volume.density", "volume.anisotropy")
@@ -197,8 +229,8 @@ def ordinate_count(facts: Facts) -> int:
 
 def _batch(facts: Facts) -> int:
     """Ordinates carried at once."""
-    g = grid(facts)
-    most = min(_BATCH_BYTES // (16 * g.cells), _LEAST_3D_SIZE // g.size[2])
+    size = _size(facts, 1)
+    most = min(_BATCH_BYTES // (16 * int(np.prod(size))), _LEAST_3D_SIZE // size[2])
     return int(np.clip(most, 1, ordinate_count(facts)))
 
 
@@ -218,7 +250,7 @@ class RadianceInjection(Pass):
         Texture("lpv.source", "lpv_source", "harmonics of the intensity that surfaces send into each cell, over the face of a "
                 "cell, W/(m²·sr)", "rgba32f", _sh_size, access="readwrite"),
         Buffer("lpv.flux", "lpv_flux", "its sums in fixed point: cell, harmonic, colour", "int", np.dtype("i4"),
-               lambda f: grid(f).cells * SH_COUNT * 3, scratch=True),
+               lambda f: _most_cells(f) * SH_COUNT * 3, scratch=True),
     )  # fmt: skip
     uniforms = (
         *_GRID,
@@ -232,16 +264,19 @@ class RadianceInjection(Pass):
         "source": {"compute": "engines/lpv/source_comp.glsl"},
     }
     depends = ("lights", "world", "transforms", "meshes", "materials")
-    settings = ("lpv.resolution", "lpv.occlusion", *_AIR_SETTINGS)
+    settings = ("lpv.resolution", "lpv.cascades", "lpv.occlusion", *_AIR_SETTINGS)
 
     def __init__(self) -> None:
         self.count = 0
+
+    def place(self, facts: Facts) -> tuple:
+        return _place(facts)
 
     def rate(self, facts: Facts) -> str:
         return RSMGeneration().rate(facts)
 
     def defines(self, facts: Facts) -> dict[str, int]:
-        return medium_defines(facts)
+        return {**_defines(facts), **medium_defines(facts)}
 
     def absent(self, facts: Facts) -> str | None:
         return no_bounce(facts)
@@ -253,14 +288,15 @@ class RadianceInjection(Pass):
         flux = frame.resources["lpv.flux"]
         set_medium(frame, inject, facts)
         self.count = 1 if planned.stale or frame.subframe == 0 else self.count + 1
-        for first, (scale, lights) in enumerate(fixed_point_groups(sample.lights, grid(facts).cell)):
-            flux.clear()
-            for tile, view in enumerate(sample.views):
-                if int(view["light"]) in lights:
-                    _set_grid(frame, inject, facts, tile=tile, fixed_scale=scale)
-                    frame.compute(planned, inject, (int(view["rect"][2]), int(view["rect"][3])))
-            _set_grid(frame, source, facts, fixed_scale=scale, first_group=int(first == 0 and self.count == 1))
-            frame.compute(planned, source, _sh_size(facts), (4, 4, 4))
+        for g in grids(facts):
+            for first, (scale, lights) in enumerate(fixed_point_groups(sample.lights, g.cell)):
+                flux.clear()
+                for tile, view in enumerate(sample.views):
+                    if int(view["light"]) in lights:
+                        _set_grid(frame, inject, g, tile=tile, fixed_scale=scale)
+                        frame.compute(planned, inject, (int(view["rect"][2]), int(view["rect"][3])))
+                _set_grid(frame, source, g, fixed_scale=scale, first_group=int(first == 0 and self.count == 1))
+                frame.compute(planned, source, (*g.size[:2], g.size[2] * SH_COUNT), (4, 4, 4))
 
 
 def fixed_point_groups(lights: np.ndarray, cell: float) -> list[tuple[float, set[int]]]:
@@ -299,25 +335,28 @@ class GeometryInjection(Pass):
     reads = tuple(Optional(f"brdf.{name}", ("lpv.albedo",)) for name in ("albedo", "average", "energy"))
     writes = (
         Buffer("lpv.walls", "lpv_walls", "per cell and axis: blocked share of the way from the cell before, place, normal",
-               "vec4", np.dtype(("f4", (4,))), lambda f: grid(f).cells * 3),
+               "vec4", np.dtype(("f4", (4,))), lambda f: _cells(f) * 3),
         Buffer("lpv.faces", "lpv_faces", "per cell and axis: covered points, fragments, sums of their places and normals",
-               "uint", np.dtype("u4"), lambda f: grid(f).cells * 15, scratch=True),
+               "uint", np.dtype("u4"), lambda f: _most_cells(f) * 15, scratch=True),
         Buffer("lpv.albedo", "lpv_albedo", "per cell and axis: mean of albedo over |n|₁ (a float's bits), red, green, blue",
-               "uint", np.dtype("u4"), lambda f: grid(f).cells * 9,
+               "uint", np.dtype("u4"), lambda f: _cells(f) * 9,
                when=_no_albedo),
         Texture("lpv.raster", "lpv_raster", "what the surfaces are drawn to; nobody reads it", "r8",
-                lambda f: (_POINTS * max(grid(f).size),) * 2, scratch=True),
+                lambda f: (_POINTS * max(max(g.size) for g in grids(f)),) * 2, scratch=True),
     )  # fmt: skip
     uniforms = (*_GRID, Uniform("axis", "int", "axis that the scene is drawn along"))
     shaders = {"main": {"compute": "engines/lpv/walls_comp.glsl"}}
     depends = ("transforms", "meshes", "materials")
-    settings = ("lpv.resolution", "lpv.occlusion", "bounces", "use_glossy", "use_translucency")
+    settings = ("lpv.resolution", "lpv.cascades", "lpv.occlusion", "bounces", "use_glossy", "use_translucency")
+
+    def place(self, facts: Facts) -> tuple:
+        return _place(facts)
 
     def rate(self, facts: Facts) -> str:
         return "static"
 
     def defines(self, facts: Facts) -> dict[str, int]:
-        return {"LPV_POINTS": _POINTS}
+        return {"LPV_POINTS": _POINTS, **_defines(facts)}
 
     def absent(self, facts: Facts) -> str | None:
         if not facts.settings.lpv.occlusion:
@@ -325,12 +364,16 @@ class GeometryInjection(Pass):
         return None if facts.triangles else "the scene has no surfaces"
 
     def run(self, frame: Frame, planned: Planned) -> None:
-        facts = planned.facts
-        g = grid(facts)
+        if planned.has("lpv.albedo"):
+            frame.resources["lpv.albedo"].clear()
+        for g in grids(planned.facts):
+            self._draw(frame, planned, g)
+
+    @staticmethod
+    def _draw(frame: Frame, planned: Planned, g: Grid) -> None:
+        """The walls of one grid."""
         ctx = frame.gl.ctx
-        reflect = planned.has("lpv.albedo")
-        for name in ("lpv.faces", "lpv.albedo") if reflect else ("lpv.faces",):
-            frame.resources[name].clear()
+        frame.resources["lpv.faces"].clear()
         fbo = frame.targets(planned)
         fbo.use()
         fbo.scissor = None
@@ -338,7 +381,7 @@ class GeometryInjection(Pass):
         frame.bind(planned)
         stages = {"vertex": "surface/surface_vert.glsl", "fragment": "engines/lpv/geometry_frag.glsl"}
         options = {
-            "full": reflect, "units": len(planned.texture_reads()), "defines": {
+            "full": planned.has("lpv.albedo"), "units": len(planned.texture_reads()), "defines": {
                 "SURFACE_TABLES": 2 if planned.has("brdf.average") else 0, "SURFACE_SEE_THROUGH_GLASS": 1,
                 "SURFACE_SEEN_BY_CAMERA": 0, "SURFACE_SEEN_BY_SHADOW": 1,
             },
@@ -353,11 +396,11 @@ class GeometryInjection(Pass):
                 clip[row, k], clip[row, 3] = scale, -1.0 - scale * g.origin[k]
             clip[3, 3] = 1.0
             for program in programs:
-                _set_grid(frame, program, facts, axis=axis)
+                _set_grid(frame, program, g, axis=axis)
             frame.gpu.draw(planned, stages, SHADOW, np.ascontiguousarray(clip.T, "f4"), **options)
         ctx.memory_barrier(moderngl.ALL_BARRIER_BITS)
         program = frame.program(planned)
-        _set_grid(frame, program, facts)
+        _set_grid(frame, program, g)
         frame.compute(planned, program, g.size, (4, 4, 4))
 
 
@@ -373,7 +416,7 @@ class Propagation(Pass):
         Texture("lpv.volume", "lpv_volume", "harmonics of the radiance in each cell by direction of travel, W/(m²·sr)",
                 "rgba32f", _sh_size, access="readwrite"),
         Texture("lpv.radiance", "lpv_radiance", "radiance along each ordinate of a batch, W/(m²·sr)", "rgba32f",
-                lambda f: (*grid(f).size[:2], grid(f).size[2] * _batch(f)), access="readwrite", scratch=True),
+                lambda f: _size(f, _batch(f)), access="readwrite", scratch=True),
         Buffer("lpv.ordinates", "ordinates", "unit vectors and solid angles", "vec4", np.dtype(("f4", (4,))),
                lambda f: ordinate_count(f), scratch=True),
     )  # fmt: skip
@@ -387,17 +430,24 @@ class Propagation(Pass):
         Uniform("medium_extinction", "vec3", "share of light lost per metre of the air"),
         Uniform("medium_scattering", "vec3", "share of light scattered per metre"),
         Uniform("medium_anisotropy", "float", "mean cosine of the scattering angle"),
+        Uniform("inner_size", "ivec3", "cells along each axis of the grid within this one"),
+        Uniform("inner_column", "int", "where they begin along x in textures"),
+        Uniform("inner_low", "ivec3", "where it begins, in cells of this one"),
+        Uniform("inner_rim", "int", "its grid_rim"),
         Uniform("wave", "int", "the diagonal plane whose cells take their light, or the iteration"),
     )
     shaders = {
         "expand": {"compute": "engines/lpv/expand_comp.glsl"},
+        "rim": {"compute": "engines/lpv/rim_comp.glsl"},
         "main": {"compute": "engines/lpv/propagate_comp.glsl"},
         "gather": {"compute": "engines/lpv/gather_comp.glsl"},
         "reflect": {"compute": "engines/lpv/reflect_comp.glsl"},
         "bounced": {"compute": "engines/lpv/bounced_comp.glsl"},
     }
     depends = ("lights", "world", "transforms", "meshes", "materials")
-    settings = ("lpv.resolution", "lpv.directions", "lpv.iterations", "lpv.occlusion", "bounces", *_AIR_SETTINGS)
+    settings = (
+        "lpv.resolution", "lpv.cascades", "lpv.directions", "lpv.iterations", "lpv.occlusion", "bounces", *_AIR_SETTINGS,
+    )  # fmt: skip
 
     def __init__(self, injection: RadianceInjection, bounces: int = 1, iterations: int = 0) -> None:
         self.injection = injection
@@ -408,7 +458,7 @@ class Propagation(Pass):
                 Texture("lpv.bounced", "lpv_bounced", "lpv.source and what the walls reflect of the volume's light", "rgba32f",
                         _sh_size, access="readwrite", scratch=True),
                 Buffer("lpv.reflected", "lpv_reflected", "what the walls reflect in fixed point: cell, harmonic, colour", "int",
-                       np.dtype("i4"), lambda f: grid(f).cells * SH_COUNT * 3, scratch=True),
+                       np.dtype("i4"), lambda f: _most_cells(f) * SH_COUNT * 3, scratch=True),
             )  # fmt: skip
         if iterations:
             size = self.writes[1].size
@@ -425,19 +475,21 @@ class Propagation(Pass):
     def defines(self, facts: Facts) -> dict[str, int]:
         return {
             "HAS_LPV_BOUNCED": int(facts.settings.bounces > 1), "LPV_LIMITED": int(facts.settings.lpv.iterations > 0),
-            **medium_defines(facts),
+            **_defines(facts), **medium_defines(facts),
         }  # fmt: skip
+
+    def place(self, facts: Facts) -> tuple:
+        return _place(facts)
 
     def run(self, frame: Frame, planned: Planned) -> None:
         facts = planned.facts
         if not planned.stale and self.injection.count & (self.injection.count - 1):
             return
-        g = grid(facts)
         table = ordinates(ordinate_count(facts))
         frame.upload("lpv.ordinates", table)
         filled = air(facts)
-        if filled is not None:
-            medium = filled.medium
+        if filled:
+            medium = filled[0].medium
             for key in ("main", "bounced") if planned.has("lpv.albedo") else ("main",):
                 frame.set(
                     frame.program(planned, key),
@@ -447,38 +499,45 @@ class Propagation(Pass):
         self._carry(frame, planned, table, bounced=False)
         if planned.has("lpv.albedo"):
             reflect, bounced = frame.program(planned, "reflect"), frame.program(planned, "bounced")
-            # Passive walls bring back less than came: the sum of all lights' bounds holds for every bounce.
-            groups = fixed_point_groups(frame.light_sample(bounce=True).lights, g.cell)
-            scale = 1.0 / sum(1.0 / group_scale for group_scale, _ in groups)
+            lights = frame.light_sample(bounce=True).lights
             for _ in range(facts.settings.bounces - 1):
-                frame.resources["lpv.reflected"].clear()
-                _set_grid(frame, reflect, facts, fixed_scale=scale)
-                frame.compute(planned, reflect, g.size, (4, 4, 4))
-                _set_grid(frame, bounced, facts, fixed_scale=scale, source_scale=1.0 / max(self.injection.count, 1))
-                frame.compute(planned, bounced, _sh_size(facts), (4, 4, 4))
+                for g in grids(facts):
+                    # Passive walls bring back less than came: the sum of all lights' bounds holds for every bounce.
+                    scale = 1.0 / sum(1.0 / group_scale for group_scale, _ in fixed_point_groups(lights, g.cell))
+                    frame.resources["lpv.reflected"].clear()
+                    _set_grid(frame, reflect, g, fixed_scale=scale)
+                    frame.compute(planned, reflect, g.size, (4, 4, 4))
+                    _set_grid(frame, bounced, g, fixed_scale=scale, source_scale=1.0 / max(self.injection.count, 1))
+                    frame.compute(planned, bounced, (*g.size[:2], g.size[2] * SH_COUNT), (4, 4, 4))
                 self._carry(frame, planned, table, bounced=True)
 
     def _carry(self, frame: Frame, planned: Planned, table: np.ndarray, *, bounced: bool) -> None:
         """Fill the volume from the sources: the first ones, or those that a bounce was added to."""
         facts = planned.facts
-        g = grid(facts)
         expand, carry, gather = (frame.program(planned, k) for k in ("expand", "main", "gather"))
-        size = _batch(facts)
+        every, size = grids(facts), _batch(facts)
         for first in range(0, len(table), size):
             count = min(size, len(table) - first)
-            _set_grid(frame, expand, facts, batch_first=first, batch_count=count, bounced=int(bounced),
-                      source_scale=1.0 / max(self.injection.count, 1))
-            frame.compute(planned, expand, (*g.size[:2], g.size[2] * count), (4, 4, 4))
-            _set_grid(frame, carry, facts, batch_first=first, batch_count=count)
-            if facts.settings.lpv.iterations:
-                self._iterate(frame, planned, carry, count)
-            else:
-                for wave in range(sum(g.size) - 2):
-                    carry["wave"].value = wave
-                    carry.run(-(-g.size[0] // 8), -(-g.size[1] // 8), count)
-                    frame.gl.ctx.memory_barrier(moderngl.SHADER_IMAGE_ACCESS_BARRIER_BIT)
-            _set_grid(frame, gather, facts, batch_first=first, batch_count=count)
-            frame.compute(planned, gather, g.size, (4, 4, 4))
+            for around, g in zip((None, *every), every, strict=False):
+                layers = (*g.size[:2], g.size[2] * count)
+                _set_grid(frame, expand, g, batch_first=first, batch_count=count, bounced=int(bounced),
+                          source_scale=1.0 / max(self.injection.count, 1))
+                frame.compute(planned, expand, layers, (4, 4, 4))
+                if around is not None:
+                    rim = frame.program(planned, "rim")
+                    _set_grid(frame, rim, around, batch_count=count, inner_size=g.size, inner_column=g.column,
+                              inner_low=g.low, inner_rim=g.rim)
+                    frame.compute(planned, rim, layers, (4, 4, 4))
+                _set_grid(frame, carry, g, batch_first=first, batch_count=count)
+                if facts.settings.lpv.iterations:
+                    self._iterate(frame, planned, carry, count)
+                else:
+                    for wave in range(sum(g.size) - 2):
+                        carry["wave"].value = wave
+                        carry.run(-(-g.size[0] // 8), -(-g.size[1] // 8), count)
+                        frame.gl.ctx.memory_barrier(moderngl.SHADER_IMAGE_ACCESS_BARRIER_BIT)
+                _set_grid(frame, gather, g, batch_first=first, batch_count=count)
+                frame.compute(planned, gather, g.size, (4, 4, 4))
 
     @staticmethod
     def _iterate(frame: Frame, planned: Planned, carry, count: int) -> None:
@@ -503,19 +562,22 @@ class IndirectLighting(ScreenPass):
     figure = "LPV Lighting Computation"
     reads = ("lpv.volume", Optional("lpv.walls"), "gbuffer.depth", "gbuffer.normal")
     writes = (INDIRECT_DIFFUSE,)
-    uniforms = _GRID
+    uniforms = _GRIDS
     fragment = "engines/lpv/lighting_frag.glsl"
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return _defines(facts, chooses=True)
 
     def absent(self, facts: Facts) -> str | None:
         return no_indirect(facts)
 
     def prepare(self, frame: Frame, planned: Planned, program) -> None:
-        _set_grid(frame, program, planned.facts)
+        _set_grids(frame, program, planned.facts)
 
 
 def _march_steps(facts: Facts) -> int:
-    """Faces that a ray through the grid can pass."""
-    return int(sum(grid(facts).size))
+    """Faces that a ray through the grids can pass."""
+    return sum(sum(g.size) for g in grids(facts))
 
 
 class AmbientOcclusion(ScreenPass):
@@ -529,21 +591,21 @@ class AmbientOcclusion(ScreenPass):
                 "rg16f", _screen, scratch=True),
     )  # fmt: skip
     uniforms = (
-        *_GRID,
+        *_GRIDS,
         Uniform("ao_directions", "int", "rays per pixel"),
         Uniform("ao_distance", "float", "how far an occluder counts, m"),
     )
     fragment = "engines/lpv/ao_frag.glsl"
 
     def defines(self, facts: Facts) -> dict[str, int]:
-        return {"MARCH_STEPS": _march_steps(facts)}
+        return {"MARCH_STEPS": _march_steps(facts), **_defines(facts, chooses=True)}
 
     def absent(self, facts: Facts) -> str | None:
         return None if facts.settings.use_ao else "ambient occlusion is switched off"
 
     def prepare(self, frame: Frame, planned: Planned, program) -> None:
         ao = planned.facts.settings.ao
-        _set_grid(frame, program, planned.facts, ao_directions=ao.samples, ao_distance=planned.facts.ao_distance)
+        _set_grids(frame, program, planned.facts, ao_directions=ao.samples, ao_distance=planned.facts.ao_distance)
 
 
 _RAY_SOURCE = "lamps' light from RSMs, bounces from the volume, hits from cells"
@@ -553,19 +615,19 @@ _RAY_READS = (
     Optional("vpls"), Optional("gbuffer.emission", ("transmission.indirect",)),
 )  # fmt: skip
 _RAY_UNIFORMS = (
-    *_GRID, *CELL_UNIFORMS, *MEDIUM_UNIFORMS, Uniform("rsm_light_count", "int", "lights with reflective shadow maps"),
+    *_GRIDS, *CELL_UNIFORMS, *MEDIUM_UNIFORMS, Uniform("rsm_light_count", "int", "lights with reflective shadow maps"),
 )  # fmt: skip
 
 
 def _set_ray(frame: Frame, program, facts: Facts, **more) -> None:
     set_cells(frame, program, facts)
     set_medium(frame, program, facts)
-    _set_grid(frame, program, facts, rsm_light_count=len(facts.rig.sources), **more)
+    _set_grids(frame, program, facts, rsm_light_count=len(facts.rig.sources), **more)
 
 
 def _ray_defines(facts: Facts) -> dict[str, int]:
     # raycast_lib can gather virtual lights; here are none.
-    return {"MESH_LIGHTS": 0, **medium_defines(facts)}
+    return {"MESH_LIGHTS": 0, **_defines(facts, chooses=True), **medium_defines(facts)}
 
 
 class GlossyLighting(ScreenPass):
@@ -575,8 +637,8 @@ class GlossyLighting(ScreenPass):
     figure = "LPV Lighting Computation"
     source = _RAY_SOURCE
     reads = (*_RAY_READS, *LOBE)
-    writes = (INDIRECT_GLOSSY,)
-    uniforms = (*_RAY_UNIFORMS, Uniform("glossy_rays", "int", "rays per pixel"))
+    writes = (GLOSSY_TRACED, GLOSSY_RAY)
+    uniforms = _RAY_UNIFORMS
     fragment = "engines/lpv/glossy_frag.glsl"
 
     def defines(self, facts: Facts) -> dict[str, int]:
@@ -586,7 +648,7 @@ class GlossyLighting(ScreenPass):
         return no_gloss(facts)
 
     def prepare(self, frame: Frame, planned: Planned, program) -> None:
-        _set_ray(frame, program, planned.facts, glossy_rays=planned.facts.settings.lpv.glossy_rays)
+        _set_ray(frame, program, planned.facts)
 
 
 class Refraction(ScreenPass):

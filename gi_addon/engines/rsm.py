@@ -8,6 +8,8 @@ light is gathered at low resolution and interpolated where surfaces agree.
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 from ..facts import Facts
 from ..frame import Frame
 from ..gpu_types import LIGHT_MESH, VPL
@@ -18,10 +20,10 @@ from ..passes.direct_lighting import DirectLighting, TranslucentLighting
 from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint, gather_size
 from ..passes.lights import LightList, RSMGeneration, ShadowMaps
 from ..passes.occupancy import CELL_UNIFORMS, Occupancy, set_cells
+from ..passes.reflections import GLOSSY_RAY, GLOSSY_TRACED, reflection_sharing
 from ..passes.resolve import Resolve
 from ..passes.screen import (
     INDIRECT_DIFFUSE,
-    INDIRECT_GLOSSY,
     LOBE,
     REFRACTING,
     TRANSMISSION_INDIRECT,
@@ -63,6 +65,7 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         Subsurface(),
         TranslucentLighting(),
         GlossyReflections(),
+        *reflection_sharing(settings),
         Refraction(),
         Volumetric(),
         Resolve(layers),
@@ -72,18 +75,42 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
 def _gather_defines(facts: Facts, *, always: bool = False) -> dict[str, int]:
     lamps = any(s.kind == LIGHT_MESH for s in facts.rig.sources)
     untested = {"HAS_OCCUPANCY": 0} if facts.settings.rsm.visibility == "NONE" and not always else {}
-    return {"GATHER_SCALE": facts.settings.gather_scale, "MESH_LIGHTS": int(lamps), **medium_defines(facts), **untested}
+    return {
+        "GATHER_SCALE": facts.settings.gather_scale, "MESH_LIGHTS": int(lamps), "VISIBILITY_RAYS": _rays(facts),
+        **medium_defines(facts), **untested,
+    }  # fmt: skip
+
+
+# Of fewer rays, drawing which virtual lights to test takes longer than the rays.
+_FEWEST_RAYS = 16
+
+
+def _rays(facts: Facts) -> int:
+    """Virtual lights that a pixel tests in a sub-frame; 0: all, as where lights are to add up exactly: which ones are drawn
+    hangs on what the others send."""
+    rsm = facts.settings.rsm
+    rays = max(-(-rsm.visibility_rays // facts.subframes), _FEWEST_RAYS)
+    return rays if rsm.visibility_rays > 0 and not rsm.own_samples and rays < vpl_count(facts) else 0
+
+
+def first_count(facts: Facts) -> int:
+    """Virtual point lights of the first bounce."""
+    rsm = facts.settings.rsm
+    # As the shader tells lights apart (engines/rsm/vpls_comp.glsl).
+    salts = [s.salt for s, first in zip(facts.rig.sources, facts.rig.bounce.first, strict=True) if first >= 0]
+    lights = sum(a != b for a, b in pairwise((None, *salts)))
+    return rsm.samples * (max(lights, 1) if rsm.own_samples else 1)
 
 
 def vpl_count(facts: Facts) -> int:
     """Virtual point lights of all bounces, and those in the air."""
-    return facts.settings.rsm.samples + max(facts.settings.bounces - 1, 0) * points_per_subframe(facts) + air_count(facts)
+    return first_count(facts) + max(facts.settings.bounces - 1, 0) * points_per_subframe(facts) + air_count(facts)
 
 
 def air_count(facts: Facts) -> int:
     """Points of the air that scatter light onto surfaces: half as many as first-bounce lights, being smoother."""
     found = air(facts)
-    return max(1, facts.settings.rsm.samples // 2) if found is not None and any(found.medium.scattering) else 0
+    return max(1, facts.settings.rsm.samples // 2) if any(any(d.medium.scattering) for d in found) else 0
 
 
 class RSMFlux(Pass):
@@ -103,6 +130,7 @@ class RSMFlux(Pass):
     }
     depends = ("lights", "world", "transforms", "meshes", "materials")
     settings = ("use_volumetric", "volume.density")
+    repeats = True
 
     def rate(self, facts: Facts) -> str:
         return RSMGeneration().rate(facts)
@@ -146,30 +174,30 @@ class RSMSamplingPattern(Pass):
     figure = "RSM Sampling Pattern"
     reads = ("rsm.flux", "rsm.depth", "rsm.albedo", "rsm.normal", "rsm.lights", "rsm.views")
     writes = (
+        Buffer("vpls.drawn", "drawn_vpls", "those of the first bounce, as they were drawn", "Vpl", VPL, first_count, scratch=True),
         Buffer("vpls", "vpls", "virtual point lights of this sub-frame", "Vpl", VPL,
                vpl_count),
     )  # fmt: skip
     uniforms = (
         Uniform("vpl_count", "int", "how many to draw; for the next bounce and the air: where the last ones end"),
         Uniform("view_count", "int", "views in the list"),
-        Uniform("levels", "int", "levels of the flux pyramid above the texels"),
+        Uniform("own_samples", "int", "virtual lights that each light has for itself; 0: they share all by flux"),
         Uniform("bounce_first", "int", "the first light of the bounce before"),
         Uniform("point_first", "int", "the sub-frame's first surface point"),
         Uniform("point_count", "int", "surface points of a bounce"),
-        Uniform("medium_scattering", "vec3", "share of light scattered per metre"),
-        Uniform("medium_anisotropy", "float", "mean cosine of the scattering angle"),
         *MEDIUM_UNIFORMS,
         *CELL_UNIFORMS,
     )
     shaders = {
         "main": {"compute": "engines/rsm/vpls_comp.glsl"},
+        "order": {"compute": "engines/rsm/order_comp.glsl"},
         "air": {"compute": "engines/rsm/air_comp.glsl"},
         "bounce": {"compute": "engines/rsm/bounce_comp.glsl"},
     }
 
     def __init__(self, settings: Settings) -> None:
-        if settings.bounces > 1:
-            self.reads = _tested((*type(self).reads, "surface.points"), settings)
+        points = ("surface.points",) if settings.bounces > 1 else ()
+        self.reads = _tested((*type(self).reads, *points), settings)
 
     def defines(self, facts: Facts) -> dict[str, int]:
         return _gather_defines(facts)
@@ -177,15 +205,19 @@ class RSMSamplingPattern(Pass):
     def run(self, frame: Frame, planned: Planned) -> None:
         program = frame.program(planned)
         facts = planned.facts
-        count = facts.settings.rsm.samples
+        rsm, count = facts.settings.rsm, first_count(facts)
         set_medium(frame, program, facts)
+        set_cells(frame, program, facts)
         frame.set(
             program,
             vpl_count=count,
             view_count=len(facts.rig.bounce.sizes),
-            levels=max(facts.rig.bounce.size).bit_length() - 1,
+            own_samples=rsm.samples if rsm.own_samples else 0,
         )
         frame.compute(planned, program, (count,), (64,))
+        order = frame.program(planned, "order")
+        frame.set(order, vpl_count=count)
+        frame.compute(planned, order, (count,), (64,))
         if facts.settings.bounces > 1:
             self._more_bounces(frame, planned, count)
         if air_count(facts):
@@ -194,15 +226,13 @@ class RSMSamplingPattern(Pass):
     @staticmethod
     def _air(frame: Frame, planned: Planned) -> None:
         program, facts = frame.program(planned, "air"), planned.facts
-        medium, count = air(facts).medium, air_count(facts)
+        count = air_count(facts)
         set_medium(frame, program, facts)
         frame.set(
             program,
             point_count=count,
             vpl_count=vpl_count(facts) - count,
             view_count=len(facts.rig.bounce.sizes),
-            medium_scattering=tuple(float(v) for v in medium.scattering),
-            medium_anisotropy=float(medium.anisotropy),
         )
         frame.compute(planned, program, (count,), (64,))
 
@@ -308,7 +338,7 @@ class GlossyReflections(ScreenPass):
     title = "RSM Glossy Reflections"
     figure = "Ray Casting in RSM"
     reads = (*_RAY_READS, *LOBE)
-    writes = (INDIRECT_GLOSSY,)
+    writes = (GLOSSY_TRACED, GLOSSY_RAY)
     uniforms = _RAY_UNIFORMS
     fragment = "engines/rsm/glossy_frag.glsl"
 

@@ -8,8 +8,9 @@ hemisphere with a visibility bitmask. What lies outside the picture, or behind s
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,16 +18,16 @@ from ..facts import Facts
 from ..frame import Frame
 from ..gpu_scene import world_source
 from ..gpu_types import LIGHT_SUN, LIGHT_WORLD
-from ..graph import Optional, Pass, Planned, Texture, Uniform
+from ..graph import Optional, Pass, Planned, Texture, Uniform, glsl_name
 from ..passes.ao import AOBlur, AOGeneration
 from ..passes.brdf_tables import BRDFTables
 from ..passes.direct_lighting import DirectLighting, TranslucentLighting
 from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint
 from ..passes.lights import LightList, ShadowMaps
 from ..passes.occupancy import Occupancy
+from ..passes.reflections import GLOSSY_RAY, GLOSSY_TRACED, reflection_sharing
 from ..passes.resolve import Resolve
 from ..passes.screen import (
-    INDIRECT_GLOSSY,
     LIGHT,
     LOBE,
     REFRACTING,
@@ -47,15 +48,16 @@ from ..settings import Settings
 
 def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
     """Figure 4d, in order; each further bounce repeats the gather."""
+    layers_behind = range(2, settings.ssdo.layers + 1) if settings.use_indirect_diffuse else ()
     bounces = []
     for bounce in range(1, settings.bounces + 1):
         last = bounce == settings.bounces
         bounces += [
             SentLight(bounce),
-            InterpolatedIndirect(f"ssdo.sent.{bounce}", f"ssdo.low.{bounce}"),
+            InterpolatedIndirect(f"ssdo.sent.{bounce}", f"ssdo.low.{bounce}", layers_behind, last=last),
             _smoothing(f"ssdo.sent.{bounce}", f"ssdo.low.{bounce}"),
             IndirectLighting(f"ssdo.sent.{bounce}", f"ssdo.low.{bounce}",
-                             "indirect.diffuse" if last else f"ssdo.bounce.{bounce}"),
+                             "indirect.diffuse" if last else f"ssdo.bounce.{bounce}", layers_behind),
         ]  # fmt: skip
     return [
         BRDFTables(),
@@ -74,10 +76,13 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         IndirectLighting("gbuffer.emission", "screen.low", "screen.light"),
         WorldRays(),
         DirectLighting() if settings.ssdo.shadows == "MAPS" or not settings.use_shadows else ScreenShadowLighting(),
+        *(task for layer in layers_behind for task in _layer(layer)),
         *bounces,
         ShadedScreen(),
         NearnessPyramid(),
         Reflections(),
+        *reflection_sharing(settings),
+        *reflection_sharing(settings, SOURCES_TRACED, REFLECTED_SOURCES, "SHARED_SOURCES"),
         TranslucentLayer(),
         TranslucentBack(),
         TranslucentLighting(),
@@ -86,6 +91,11 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         Volumetric() if settings.ssdo.volumetric == "MARCH" else RadialBlur(),
         Resolve(layers),
     ]
+
+
+def _layer(layer: int) -> list[Pass]:
+    """The surfaces behind the layer before, their planes and what they send."""
+    return [Layer(layer), ScreenPlanes(layer), LayerLighting(layer), SentLight(1, layer)]
 
 
 # What a gather takes, and what it makes (gather_lib.glsl, lighting_frag.glsl).
@@ -102,13 +112,73 @@ def _no_bounce(facts: Facts) -> str | None:
 class ScreenPlanes(ScreenPass):
     """The depth buffer in a form in which planes and rays are linear."""
 
-    title = "SSDO Planes"
-    reads = ("gbuffer.depth", "gbuffer.normal")
-    writes = (
-        Texture("ssdo.planes", "ssdo_planes", "nearness of the visible surface (1/view depth; orthographic: −view depth) and "
-                "its slope per pixel of the surface's plane", "rgba32f", _screen),
-    )  # fmt: skip
     fragment = "engines/ssdo/planes_frag.glsl"
+
+    def __init__(self, layer: int = 1) -> None:
+        self.layer = layer
+        self.title = "SSDO Planes" if layer == 1 else f"SSDO Planes {layer}"
+        self.reads = tuple(_of_layer(name, layer) for name in ("gbuffer.depth", "gbuffer.normal"))
+        self.writes = (
+            Texture(_planes(layer), "ssdo_planes" if layer == 1 else f"ssdo_planes_{layer}", "nearness of the surface (1/view "
+                    "depth; orthographic: −view depth), its slope per pixel of the surface's plane, and whether the eye is "
+                    "before it: 1, or −1", "rgba32f", _screen),
+        )  # fmt: skip
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return {"LAYER": self.layer}
+
+
+def _of_layer(name: str, layer: int) -> str:
+    """The G-buffer's ``gbuffer.x`` and ``direct.diffuse``, of what lies behind it for layers from 2."""
+    return name if layer == 1 else f"ssdo.layer{layer}.{name.removeprefix('gbuffer.')}"
+
+
+def _planes(layer: int) -> str:
+    return "ssdo.planes" if layer == 1 else f"ssdo.planes.{layer}"
+
+
+class Layer(GBuffer):
+    """What lies behind the layer before, whichever way it faces: depth peeling."""
+
+    figure = "G-buffers + Transparency G-buffers Generation"
+
+    def __init__(self, layer: int) -> None:
+        self.layer = layer
+        self.title = f"SSDO Layer {layer}"
+        self.reads = (*GBuffer.reads, _planes(layer - 1))
+        kept = ("depth", "normal", "diffuse", "specular", "lobe", "set", "z")
+        self.writes = tuple(
+            replace(w, name=_of_layer(w.name, layer)) for w in GBuffer.writes if w.name.removeprefix("gbuffer.") in kept
+        )
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        left_out = {f"HAS_{w.glsl.upper()}": 0 for w in GBuffer.writes}
+        return {"LAYER": self.layer, **{n: v for n, v in left_out.items() if n not in _present(self)}}
+
+    def absent(self, facts: Facts) -> str | None:
+        return super().absent(facts) or _no_bounce(facts)
+
+
+def _present(task: Pass) -> set[str]:
+    return {f"HAS_{w.glsl.upper()}" for w in task.writes}
+
+
+class LayerLighting(DirectLighting):
+    """Direct light on a layer that the camera does not see."""
+
+    kept = ("lights", Optional("lights.views"), Optional("shadow.depth"), Optional("rsm.depth"))
+
+    def __init__(self, layer: int) -> None:
+        self.title = f"SSDO Layer {layer} Direct Lighting"
+        self.reads = (*self.kept, *(_of_layer(name, layer) for name in ("gbuffer.depth", "gbuffer.normal")),
+                      Optional(_of_layer("gbuffer.set", layer)))  # fmt: skip
+        self.writes = (replace(DirectLighting.writes[0], name=_of_layer("direct.diffuse", layer)),)
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        told = {*self.kept, Optional("gbuffer.set")}
+        others = [r.name for r in DirectLighting.reads if isinstance(r, Optional) and r not in told]
+        others += [w.name for w in DirectLighting.writes[1:]]
+        return {**super().defines(facts), **{f"HAS_{glsl_name(name).upper()}": 0 for name in others}}
 
 
 class SentLight(ScreenPass):
@@ -116,23 +186,39 @@ class SentLight(ScreenPass):
 
     fragment = "engines/ssdo/sent_frag.glsl"
 
-    def __init__(self, bounce: int) -> None:
-        self.title = f"SSDO Sent Light {bounce}"
-        self.bounce = bounce
+    def __init__(self, bounce: int, layer: int = 1) -> None:
+        self.title = f"SSDO Sent Light {bounce}" if layer == 1 else f"SSDO Layer {layer} Sent Light"
+        self.bounce, self.layer = bounce, layer
         before = (Optional(f"ssdo.bounce.{bounce - 1}"),) if bounce > 1 else ()
         self.reads = (
-            "direct.diffuse", "gbuffer.diffuse", Optional("gbuffer.specular"), Optional("gbuffer.lobe"),
+            _of_layer("direct.diffuse", layer), _of_layer("gbuffer.diffuse", layer),
+            Optional(_of_layer("gbuffer.specular", layer)), Optional(_of_layer("gbuffer.lobe", layer)),
             Optional("brdf.average"), Optional("brdf.energy"), *before,
         )  # fmt: skip
-        self.writes = (
-            Texture(f"ssdo.sent.{bounce}", "ssdo_sent", "radiance that leaves the surface, W/(m²·sr)", "rgba32f", _screen),
-        )
+        name, glsl = (f"ssdo.sent.{bounce}", "ssdo_sent") if layer == 1 else (f"ssdo.layer{layer}.sent", f"ssdo_sent_{layer}")
+        self.writes = (Texture(name, glsl, "radiance that leaves the surface, W/(m²·sr)", "rgba32f", _screen),)
 
     def defines(self, facts: Facts) -> dict[str, int]:
-        return {} if self.bounce > 1 else {"HAS_LAST_BOUNCE": 0}
+        return {"LAYER": self.layer, **({} if self.bounce > 1 else {"HAS_LAST_BOUNCE": 0})}
 
     def absent(self, facts: Facts) -> str | None:
         return _no_bounce(facts)
+
+
+_BOX = Uniform("ssdo_box", "vec4", "the rectangle of the screen that the scene's box covers: low x, y, high x, y, pixels")
+
+
+def _screen_box(frame: Frame, facts: Facts) -> tuple[float, float, float, float]:
+    """``ssdo_box`` of this sub-frame: with a pixel around for rounding, within what is drawn; all that where the eye is in it."""
+    width, height = facts.resolution
+    corners = np.array([[(low, high)[k >> axis & 1] for axis, (low, high) in enumerate(zip(*facts.rig.bounds, strict=True))]
+                        for k in range(8)])  # fmt: skip
+    clip = np.c_[corners, np.ones(8)] @ frame.view["clip_from_world"].astype("f8")  # stored by columns
+    if (clip[:, 3] <= 1e-6 * facts.radius).any():
+        return (0.0, 0.0, float(width), float(height))
+    at = (clip[:, :2] / clip[:, 3:] * 0.5 + 0.5) * (width, height)
+    low, high = np.clip([at.min(axis=0) - 1.0, at.max(axis=0) + 1.0], 0.0, (width, height))
+    return (*low.tolist(), *high.tolist())
 
 
 class _Gather(ScreenPass):
@@ -143,8 +229,16 @@ class _Gather(ScreenPass):
         Uniform("ssdo_steps", "int", "depth tests along each of a slice's two sides"),
         Uniform("ssdo_radius", "float", "how far light is gathered from, world units; 0 = everywhere"),
         Uniform("ssdo_thickness", "float", "thickness of what the screen shows, as a share of its distance from the receiver"),
+        _BOX,
     )
     sent = ""
+    layers = 1  # of depth that light comes from
+    last = False  # bounce: what it lights sends no further
+
+    def behind(self, layers: Iterable[int]) -> tuple[str, ...]:
+        """What it reads of the layers behind."""
+        self.layers = max(layers, default=1)
+        return tuple(name for layer in layers for name in (_planes(layer), f"ssdo.layer{layer}.sent"))
 
     @property
     def from_sources(self) -> bool:
@@ -164,6 +258,8 @@ class _Gather(ScreenPass):
             "SENT": _SENT["SENT_EMISSION" if emits else "SENT_NOTHING" if self.from_sources else "SENT_BOUNCE"],
             "GATHER_WORLD": int(self.from_sources and not facts.world_black),
             "GATHER_SCALE": facts.settings.gather_scale,
+            "LAYERS": self.layers,
+            "MARGIN_RECEIVES": int(not self.last or _shaded_screen_wanted(facts)),
         }
 
     def run(self, frame: Frame, planned: Planned) -> None:
@@ -176,6 +272,7 @@ class _Gather(ScreenPass):
                 ssdo_steps=settings.steps,
                 ssdo_radius=settings.radius,
                 ssdo_thickness=settings.thickness,
+                ssdo_box=_screen_box(frame, planned.facts),
             )
             frame.screen(planned, program)
 
@@ -186,10 +283,11 @@ class InterpolatedIndirect(_Gather):
     figure = "SSDO Interpolated Indirect Lighting Computation"
     fragment = "engines/ssdo/gather_low_frag.glsl"
 
-    def __init__(self, sent: str, low: str) -> None:
-        self.sent = sent
+    def __init__(self, sent: str, low: str, layers_behind: Sequence[int] = (), *, last: bool = False) -> None:
+        self.sent, self.last = sent, last
         self.title = f"{_title(sent)} (low resolution)"
-        self.reads = ("ssdo.planes", _read(sent), "gbuffer.low_depth", "gbuffer.low_normal", "gbuffer.low_pixel")
+        self.reads = ("ssdo.planes", _read(sent), "gbuffer.low_depth", "gbuffer.low_normal", "gbuffer.low_pixel",
+                      *self.behind(layers_behind))  # fmt: skip
         self.writes = raw_gather(low)
 
 
@@ -199,19 +297,28 @@ class IndirectLighting(_Gather):
     figure = "SSDO Lighting Computation"
     fragment = "engines/ssdo/lighting_frag.glsl"
 
-    def __init__(self, sent: str, low: str, target: str) -> None:
+    def __init__(self, sent: str, low: str, target: str, layers_behind: Sequence[int] = ()) -> None:
         self.sent = sent
         self.title = _title(sent)
         self.target = {"indirect.diffuse": "INDIRECT", "screen.light": "SCREEN_LIGHT"}.get(target, "BOUNCE")
         self.reads = (
             "ssdo.planes", _read(sent), "gbuffer.depth", "gbuffer.normal", Optional("gbuffer.low_depth"),
             Optional("gbuffer.low_normal"), Optional("gbuffer.low_pixel"), Optional(low), Optional(f"{low}.direction"),
+            *self.behind(layers_behind),
         )  # fmt: skip
+        self.last = self.target == "INDIRECT"
         glsl = {"INDIRECT": "indirect_diffuse", "SCREEN_LIGHT": "screen_light", "BOUNCE": "last_bounce"}[self.target]
         self.writes = (Texture(target, glsl, LIGHT, "rgba32f", _screen),)
 
     def defines(self, facts: Facts) -> dict[str, int]:
         return {**super().defines(facts), **_TARGET, "TARGET": _TARGET[f"TARGET_{self.target}"]}
+
+
+def _shaded_screen_wanted(facts: Facts) -> bool:
+    """Whether something looks at the screen's own light: mirrors, glass and what scatters below its surface."""
+    if no_gloss(facts) is None:
+        return True
+    return no_translucency(facts) is None and (facts.transmissive or facts.subsurface)
 
 
 def _title(sent: str) -> str:
@@ -241,6 +348,7 @@ class AOScan(ScreenPass):
         Uniform("ao_steps", "int", "depth tests along each of a slice's two sides"),
         Uniform("ao_distance", "float", "how far an occluder counts, m"),
         Uniform("ao_thickness", "float", "thickness of what the screen shows, as a share of its distance from the receiver"),
+        _BOX,
     )
     fragment = "engines/ssdo/ao_scan_frag.glsl"
 
@@ -255,6 +363,7 @@ class AOScan(ScreenPass):
             ao_steps=facts.settings.ao.steps,
             ao_distance=min(facts.ao_distance, 2.0 * facts.radius),
             ao_thickness=facts.settings.ssdo.thickness,
+            ssdo_box=_screen_box(frame, facts),
         )
 
 
@@ -298,19 +407,24 @@ class NearnessPyramid(Pass):
             width, height = max(1, width // 2), max(1, height // 2)
 
 
+SOURCES_TRACED = replace(
+    GLOSSY_TRACED, name="sources.traced", glsl="traced_sources",
+    when=lambda f: None if _sources_traced(f) else "the world and emissive surfaces shine through shadow maps",
+)  # fmt: skip
+REFLECTED_SOURCES = Texture("reflected.sources", "reflected_sources", "radiance that the glossy lobe reflects of the world and "
+                            "of emissive pixels, W/(m²·sr)", "rgba32f", _screen)  # fmt: skip
+
+
 class Reflections(Pass):
     """Glossy reflections of the screen."""
 
     title = "SSDO Reflections"
     reads = (
         "ssdo.planes", "ssdo.pyramid", "ssdo.shaded", "gbuffer.depth", "gbuffer.normal", *LOBE,
-        Optional("gbuffer.emission", ("reflected.sources",)),
+        Optional("gbuffer.emission", ("sources.traced",)),
     )  # fmt: skip
     writes = (
-        INDIRECT_GLOSSY,
-        Texture("reflected.sources", "reflected_sources", "radiance that it reflects of the world and of emissive pixels",
-                "rgba32f", _screen,
-                when=lambda f: None if _sources_traced(f) else "the world and emissive surfaces shine through shadow maps"),
+        GLOSSY_TRACED, SOURCES_TRACED, GLOSSY_RAY,
     )  # fmt: skip
     uniforms = (
         Uniform("ssdo_thickness", "float", "thickness of what the screen shows, as a share of its distance from the receiver"),
@@ -420,7 +534,7 @@ class RadialBlur(Volumetric):
     def defines(self, facts: Facts) -> dict[str, int]:
         # Without the camera's surfaces there is nothing in the way.
         maps = {"VOXEL_VISIBILITY": 0, "HAS_LIGHT_VIEWS": 0, "HAS_SHADOW_DEPTH": 0, "HAS_RSM_DEPTH": 0}
-        return {"RADIAL_BLUR": int(facts.visible), **maps}
+        return {**super().defines(facts), "RADIAL_BLUR": int(facts.visible), **maps}
 
     def prepare(self, frame: Frame, planned: Planned, program) -> None:
         if frame.subframe == 0:

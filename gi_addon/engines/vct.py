@@ -16,11 +16,11 @@ from ..passes.direct_lighting import DirectLighting, TranslucentLighting
 from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint, gather_size
 from ..passes.lights import LightList, RSMGeneration, ShadowMaps
 from ..passes.occupancy import Occupancy
+from ..passes.reflections import GLOSSY_RAY, GLOSSY_TRACED, reflection_sharing
 from ..passes.resolve import Resolve
 from ..passes.screen import (
     DIRECTION,
     INDIRECT_DIFFUSE,
-    INDIRECT_GLOSSY,
     LIGHT,
     LOBE,
     REFRACTING,
@@ -60,6 +60,7 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         SharedHits(),
         IndirectLighting(),
         GlossyCones(),
+        *reflection_sharing(settings),
         *([ShadowCones()] if settings.vct.shadow_cones else []),
         WorldRays(),
         DirectLighting(),
@@ -117,6 +118,7 @@ class RadianceInjection(Pass):
     }
     depends = ("lights", "world", "transforms", "meshes", "materials")
     settings = ("vct.resolution", "vct.emissive_voxels", "vct.cones", "bounces", "use_area_lights")
+    repeats = True
 
     def rate(self, facts: Facts) -> str:
         return RSMGeneration().rate(facts) if facts.rig.bounce.sizes else "static"
@@ -284,7 +286,7 @@ class GlossyCones(ScreenPass):
     title = "Voxel Glossy Reflections"
     figure = "Voxel Lighting Computation"
     reads = (*_VOLUMES, "voxels.albedo", "gbuffer.depth", "gbuffer.normal", *LOBE)
-    writes = (INDIRECT_GLOSSY,)
+    writes = (GLOSSY_TRACED, GLOSSY_RAY)
     uniforms = _CONE_UNIFORMS
     fragment = "engines/vct/glossy_frag.glsl"
 
@@ -349,7 +351,7 @@ class VoxelVolumetric(Volumetric):
     def defines(self, facts: Facts) -> dict[str, int]:
         # Without shadows nothing blocks.
         return {
-            "RADIAL_BLUR": 0, "VOXEL_VISIBILITY": int(facts.settings.use_shadows and facts.triangles > 0),
+            **super().defines(facts), "VOXEL_VISIBILITY": int(facts.settings.use_shadows and facts.triangles > 0),
             "HAS_LIGHT_VIEWS": 0, "HAS_SHADOW_DEPTH": 0, "HAS_RSM_DEPTH": 0,
         }  # fmt: skip
 

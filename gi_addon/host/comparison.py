@@ -440,7 +440,7 @@ def _image_editor(context) -> None:
     for window in context.window_manager.windows:
         for area in window.screen.areas:
             if area.type == "IMAGE_EDITOR":
-                area.spaces.active.image = image
+                _fit(window, area, image)
                 return
     before = set(context.window_manager.windows)
     bpy.ops.wm.window_new()
@@ -448,7 +448,15 @@ def _image_editor(context) -> None:
         if window not in before:
             area = max(window.screen.areas, key=lambda a: a.width * a.height)
             area.type = "IMAGE_EDITOR"
-            area.spaces.active.image = image
+            _fit(window, area, image)
+
+
+def _fit(window, area, image) -> None:
+    """Show ``image`` in an Image Editor, as large as fits."""
+    area.spaces.active.image = image
+    region = next(r for r in area.regions if r.type == "WINDOW")
+    with bpy.context.temp_override(window=window, area=area, region=region), contextlib.suppress(RuntimeError):
+        bpy.ops.image.view_all(fit_view=True)
 
 
 def _redraw(context) -> None:

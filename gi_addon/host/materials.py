@@ -6,12 +6,13 @@ from __future__ import annotations
 import os
 import tempfile
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import bpy
 import numpy as np
 
-from ..materials import sky
+from ..materials import ies, sky
 from ..scene import Image, Light, Link, Material, Node, ShaderGraph, World
 from .compat import SUBSURFACE_PATH, uses_nodes
 
@@ -268,6 +269,9 @@ class GraphReader:
             if node.object is not None:
                 matrix = node.object.matrix_world.inverted_safe()
                 params["object_matrix"] = [tuple(float(v) for v in matrix[r]) for r in range(3)]
+        elif node.type == "TEX_IES":
+            mean = ies.mean_strength(_ies_text(node))
+            params |= {} if mean is None else {"mean": mean}
         elif node.type == "TEX_SKY":
             params |= self.images.sky(params)
         elif node.type == "TEX_VORONOI":
@@ -284,6 +288,16 @@ class GraphReader:
             if matrix is not None:
                 params["texture_mapping"] = matrix
         return params
+
+
+def _ies_text(node: bpy.types.ShaderNodeTexIES) -> str:
+    """The file of an IES Texture; empty where it can't be read."""
+    if node.mode == "INTERNAL":
+        return node.ies.as_string() if node.ies is not None else ""
+    try:
+        return Path(bpy.path.abspath(node.filepath)).read_text(errors="replace")
+    except OSError:
+        return ""
 
 
 def _active_output(tree: bpy.types.NodeTree, kind: str, target: str):

@@ -15,8 +15,8 @@ import numpy as np
 
 from ..materials import mean_emission
 from ..scene import (
-    ALL_RAYS,
     CAMERA,
+    CATCHER,
     DIFFUSE,
     GLOSSY,
     HOLDOUT,
@@ -36,6 +36,7 @@ from ..scene import (
 )
 from . import attributes, strands
 from .compat import uses_nodes
+from .linking import Linking
 from .materials import ImageTable, default_material, holdout_material, read_light, read_material, read_world, world_sun
 
 _MESH_LIKE = {"MESH", "CURVE", "SURFACE", "FONT", "META", "CURVES"}
@@ -111,7 +112,8 @@ class SceneSync:
         images = ImageTable(self._images, scene.notes)
         layer = depsgraph.view_layer
         materials = _MaterialIndex(self, images, scene, depsgraph)
-        placed = _Placed()
+        placed = _Placed(Linking(depsgraph, scene.notes), depsgraph.view_layer)
+        lamps: list[tuple[Light, bpy.types.Object]] = []
         meshes: dict[tuple, int] = {}
         by_pointer: dict[int, int] = {}
         used_keys: set[tuple] = set()
@@ -125,10 +127,11 @@ class SceneSync:
                 light = _read_light(instance, obj, scene.notes, images)
                 if light is not None:
                     scene.lights.append(light)
+                    lamps.append((light, obj.original))
                 continue
             if obj.type not in _MESH_LIKE:
                 if obj.type == "POINTCLOUD":
-                    self._points(instance, obj, scene, materials, placed, depsgraph.view_layer)
+                    self._points(instance, obj, scene, materials, placed)
                 elif obj.type in ("VOLUME", "GREASEPENCIL"):
                     _note(scene, f"{obj.type.capitalize()} objects are not rendered yet ({obj.name})")
                 continue
@@ -143,10 +146,12 @@ class SceneSync:
             index = self._mesh_index(obj, scene, meshes, by_pointer, used_keys, pointy)
             if index is None:
                 continue
-            visibility = _visibility(obj, depsgraph.view_layer)
+            visibility = placed.visibility(obj, instance)
             placed.add(index, matrix, tuple(materials.placed(m, instance, obj, bool(visibility & HOLDOUT)) for m in slots),
                        visibility, _random(instance, obj), obj.pass_index, tuple(obj.color))  # fmt: skip
         self._meshes = {k: v for k, v in self._meshes.items() if k in used_keys}
+        for light, obj in lamps:
+            light.receivers, light.blockers = placed.linking.masks(obj)
         scene.instances = placed.instances()
         scene.world = self._read_world(getattr(layer, "world_override", None) or source.world, images)
         sun = world_sun(scene.world.graph)
@@ -169,7 +174,7 @@ class SceneSync:
         self._world = (world, used)
         return world
 
-    def _points(self, instance, obj, scene: Scene, materials, placed, layer) -> None:
+    def _points(self, instance, obj, scene: Scene, materials, placed) -> None:
         """A point cloud: one ball, placed at every point."""
         at, radii = strands.points_of(obj)
         if not len(at):
@@ -180,7 +185,7 @@ class SceneSync:
             scene.meshes.append(self._ball)
         index = scene.meshes.index(self._ball)
         slots = [slot.material for slot in obj.material_slots] or [None]
-        used, visibility = tuple(materials.index(m) for m in slots), _visibility(obj, layer)
+        used, visibility = tuple(materials.index(m) for m in slots), placed.visibility(obj, instance)
         world = np.array(instance.matrix_world, "f8")
         for place, radius in zip(at, radii, strict=True):
             matrix = np.eye(4)
@@ -203,7 +208,7 @@ class SceneSync:
             scene.meshes.append(mesh)
             slots = [s.material for s in obj.material_slots] or [None]
             material = materials.index(slots[min(slot, len(slots) - 1)])
-            placed.add(len(scene.meshes) - 1, np.eye(4), (material,), _visibility(obj, depsgraph.view_layer), 0.0,
+            placed.add(len(scene.meshes) - 1, np.eye(4), (material,), placed.visibility(obj), 0.0,
                        obj.pass_index, tuple(obj.color))  # fmt: skip
 
     # -- meshes --------------------------------------------------------------------------------------------------
@@ -325,8 +330,14 @@ def _made_variant(material: Material, held: bool, values: tuple) -> Material:
 class _Placed:
     """Instances being collected."""
 
-    def __init__(self) -> None:
+    def __init__(self, linking: Linking, layer: bpy.types.ViewLayer) -> None:
         self.rows: list[tuple] = []
+        self.linking, self.layer = linking, layer
+
+    def visibility(self, obj: bpy.types.Object, instance: bpy.types.DepsgraphObjectInstance | None = None) -> int:
+        """Visibility bits of an object; what an instancer places is lit as that is."""
+        placed_by = instance.parent if instance is not None and instance.is_instance else None
+        return _visibility(obj, self.layer) | self.linking.bits(placed_by or obj)
 
     def add(self, *row) -> None:
         self.rows.append(row)
@@ -401,7 +412,9 @@ def _visibility(obj: bpy.types.Object, layer: bpy.types.ViewLayer) -> int:
         bits &= ~CAMERA
     if obj.is_holdout or original.holdout_get(view_layer=layer):
         bits |= HOLDOUT
-    return bits & (ALL_RAYS | HOLDOUT)
+    if obj.is_shadow_catcher:
+        bits |= CATCHER
+    return bits
 
 
 def _read_object_mesh(obj: bpy.types.Object, scene: Scene, pointy: bool) -> Mesh | None:
@@ -566,9 +579,6 @@ def _by_material(mesh, triangles: np.ndarray, triangle_count: int) -> tuple[np.n
 def _read_light(instance, obj: bpy.types.Object, notes: list[str], images: ImageTable) -> Light | None:
     """A Light from Blender's, in Cycles' units."""
     data = obj.data
-    linking = getattr(obj, "light_linking", None)
-    if linking is not None and (linking.receiver_collection or linking.blocker_collection):
-        notes.append(f"light {obj.name} is linked to some objects; here it lights and is blocked by all")
     strength = float(data.energy) * 2.0 ** float(getattr(data, "exposure", 0.0))
     color = np.array(data.color, "f8")
     if getattr(data, "use_temperature", False):

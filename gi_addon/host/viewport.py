@@ -25,7 +25,7 @@ from ..gl import Cancelled, CancelToken, GLContextLost, GLError, shared
 from ..graph import Plan
 from ..renderer import Renderer, RenderError
 from ..scene import Camera, Scene
-from ..settings import SettingError, Settings
+from ..settings import SettingError, Settings, walk
 from . import properties, status
 from .sync import SceneSync
 
@@ -37,7 +37,9 @@ _COARSEST = 4
 _FAST = SLOW / 4.0
 # How long view_draw waits for a picture that should be quick, in seconds: two refreshes of a 60 Hz screen.
 _WAIT = 0.033
-# Time without a change after which the full resolution starts, in seconds: longer than the gap between mouse events.
+# Time without a change after which the full resolution starts, in seconds: longer than the gap between mouse events. It counts
+# from the picture of the last change too: who drags something waits for that before he goes on, and a full frame's slowest pass
+# would then have to be waited for.
 _SETTLE = 0.15
 # A job shows its picture after this many seconds of sub-frames.
 _BATCH = 0.25
@@ -88,7 +90,7 @@ class Viewport:
         self._job: Future | None = None
         self._token = CancelToken()
         self._request: Request | None = None
-        self._changed = 0.0
+        self._changed = self._pictured = 0.0
         self._scale = _COARSEST
         self._first: float | None = None
         self._failed: tuple | None = None
@@ -212,7 +214,7 @@ class Viewport:
         if shown is None or shown.request.key != request.key:
             return True
         if shown.request.scale > 1:
-            return time.monotonic() - self._changed >= _SETTLE
+            return time.monotonic() - max(self._changed, self._pictured) >= _SETTLE
         return shown.subframes < request.settings.viewport_samples
 
     def _work(self, gl, request: Request, first: int, token: CancelToken) -> Picture:
@@ -229,13 +231,14 @@ class Viewport:
         x, y, width, height = (v // request.scale for v in request.border)
         size = tuple(max(1, v // request.scale) for v in request.size)
         region = (x, y, max(1, min(width, size[0] - x)), max(1, min(height, size[1] - y)))
-        samples = request.settings.viewport_samples
+        settings = coarse(request.settings, request.scale)
+        samples = settings.viewport_samples
         renderer.timers.enabled = request.timed
         renderer.timers.reset()
         if first == 0:
             self._plan = renderer.begin(
-                request.scene, request.settings, resolution=size, region=region, subframes=samples,
-                camera=request.camera, film_transparent=request.film_transparent,
+                request.scene, settings, resolution=size, region=region, subframes=samples,
+                camera=request.camera, film_transparent=request.film_transparent, moving=request.scale > 1,
             )  # fmt: skip
         # A first picture is shown at once, even an outdated one; what only improves it can be given up at any pass.
         renderer.subframe(first, cancel=token if first or (request.scale == 1 and self._scale > 1) else None)
@@ -286,7 +289,7 @@ class Viewport:
         old = self._picture
         begun = old is None or old.request.key != picture.request.key or old.request.scale != picture.request.scale
         self.counts["subframes"] += picture.subframes - (0 if begun else old.subframes)
-        self._picture = picture
+        self._picture, self._pictured = picture, time.monotonic()
         self._lost = False
         if begun:
             if picture.first > 0.0:
@@ -357,6 +360,24 @@ class Viewport:
         if ready and engine is not None:
             with contextlib.suppress(ReferenceError):  # Blender has freed it between two ticks
                 engine.tag_redraw()
+
+
+# Settings that say how many rays, points and directions a sub-frame spends; no map or grid hangs on them.
+_EFFORT = ("rsm.samples", "world.rays", "ssdo.samples", "ao.samples", "lpv.glossy_rays")
+
+
+def coarse(settings: Settings, scale: int) -> Settings:
+    """The settings for a picture at 1/``scale`` of the resolution a side, which is shown until nothing changes: as much less
+    effort for each of its pixels. The noise differs, the mean does not; maps and grids are those of the full picture."""
+    if scale == 1:
+        return settings
+    out = settings.copy()
+    for path, _, meta in walk():
+        # Later bounces leave from surface points, which are drawn once for the full picture's samples.
+        kept = path == "rsm.samples" and settings.bounces > 1
+        if path in _EFFORT and out.get(path) > 0 and not kept:
+            out.set(path, max(1, int(meta.low), out.get(path) // scale))
+    return out
 
 
 # --- the view ---------------------------------------------------------------------------------------------------------

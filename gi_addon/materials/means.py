@@ -186,6 +186,8 @@ class _Walk:
         if node.kind == "LIGHT_FALLOFF":
             # With the distance squared as lights have it anyway; other falloffs count as that.
             return self.number(get("Strength", 100.0), depth)
+        if node.kind == "TEX_IES":
+            return float(node.params.get("mean", 0.0)) * self.number(get("Strength", 1.0), depth)
         if node.kind == "LIGHT_PATH":
             return 0.0 if value.output == "Is Camera Ray" else 1.0
         for name in ("Color", "Color1", "Value", "Fac", "Vector"):

@@ -17,7 +17,7 @@ class DirectLighting(ScreenPass):
     figure = "Direct Lighting Computation"
     reads = (
         "lights", Optional("lights.views"), Optional("shadow.depth"), Optional("rsm.depth"),
-        Optional("shadow.cones"), "gbuffer.depth", "gbuffer.normal",
+        Optional("shadow.cones"), "gbuffer.depth", "gbuffer.normal", Optional("gbuffer.set"),
         Optional("gbuffer.specular", ("direct.glossy",)), Optional("gbuffer.lobe", ("direct.glossy",)),
         Optional("brdf.energy", ("direct.glossy",)), Optional("brdf.average", ("direct.glossy",)),
         Optional("screen.light", ("direct.diffuse",)), Optional("world.difference", ("direct.diffuse",)),
@@ -27,8 +27,8 @@ class DirectLighting(ScreenPass):
                 "rgba32f", _screen, when=lambda f: None if f.diffuse else "no visible material is diffuse"),
         Texture("direct.glossy", "direct_glossy", "radiance reflected by the glossy lobe, W/(m²·sr)", "rgba32f",
                 _screen, when=lambda f: None if f.glossy else "no visible material is glossy"),
-        Texture("direct.shadow", "direct_shadow", "share of the direct irradiance that is not blocked", "rgba16f",
-                _screen),
+        Texture("direct.shadow", "direct_shadow", "share of the direct irradiance that is not blocked", "rgba16f", _screen,
+                when=lambda f: None if f.catchers or "shadow" in f.layers else "nothing shows it: no pass, no shadow catcher"),
     )  # fmt: skip
     uniforms = (
         Uniform("light_count", "int", "lights in the list"),
@@ -61,7 +61,7 @@ class TranslucentLighting(ScreenPass):
     figure = "Direct Lighting Computation"
     reads = (
         "lights", Optional("lights.views"), Optional("shadow.depth"), Optional("rsm.depth"), "translucent.depth",
-        "translucent.normal", "translucent.color", "translucent.medium",
+        "translucent.normal", "translucent.color", "translucent.medium", Optional("translucent.set"),
     )  # fmt: skip
     writes = (
         Texture("transmission.direct", "transmission_direct", "radiance that light from behind leaves with, tinted, W/(m²·sr); "

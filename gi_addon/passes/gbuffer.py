@@ -8,8 +8,8 @@ import numpy as np
 
 from ..facts import Facts
 from ..frame import Frame
-from ..graph import Optional, Pass, Planned, Texture
-from ..scene import CAMERA
+from ..graph import Optional, Pass, Planned, Texture, Uniform
+from ..scene import CAMERA, CATCHER, receiver_set
 from .screen import ScreenPass, _screen, no_translucency
 
 BACKGROUND_DEPTH = 0.0  # no surface: view depths are positive
@@ -21,13 +21,19 @@ def gather_size(facts: Facts) -> tuple[int, int]:
     return tuple(-(-(n + scale - 1) // scale) for n in facts.resolution)
 
 
+KIND_UNIFORMS = (
+    Uniform("object_set", "float", "set of objects that what is drawn is lit with, over 255"),
+    Uniform("object_catcher", "float", "1 where the camera sees only the shadow on it"),
+)
+
+
 class GBuffer(Pass):
     title = "G-buffers Generation"
     figure = "G-buffers Generation"
     reads = (Optional("brdf.albedo"), Optional("brdf.average"), Optional("brdf.energy"))
     writes = (
         Texture("gbuffer.depth", "gbuf_depth", "view depth, world units, 0 where nothing is; how far the smooth surface "
-                "stands above the triangle, -1 in a holdout", "rg32f", _screen, scratch=True),
+                "stands above the triangle, -1 in a holdout, -2 on a shadow catcher", "rg32f", _screen, scratch=True),
         Texture("gbuffer.normal", "gbuf_normal", "shading normal and triangle's normal, world space, octahedral",
                 "rgba16", _screen),
         Texture("gbuffer.diffuse", "gbuf_diffuse", "diffuse albedo", "rgba16f", _screen,
@@ -44,8 +50,14 @@ class GBuffer(Pass):
         Texture("gbuffer.entry", "gbuf_entry", "roughness and index of refraction of the way into what scatters below; "
                 "luminance of its own albedo", "rgba16f", _screen,
                 when=lambda f: None if f.subsurface else "no visible material scatters below its surface"),
+        Texture("gbuffer.set", "gbuf_set", "which set of objects the surface is lit with", "r8", _screen,
+                when=lambda f: None if f.rig.linked else "every light lights everything"),
         Texture("gbuffer.z", "gbuf_z", "depth buffer", "depth24", _screen, scratch=True),
     )  # fmt: skip
+    uniforms = KIND_UNIFORMS
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return {"LAYER": 1}
 
     def absent(self, facts: Facts) -> str | None:
         return None if facts.visible else "the camera has no surface to see"
@@ -64,7 +76,10 @@ class TranslucentLayer(Pass):
     title = "Transparency G-buffers Generation"
     figure = "G-buffers + Transparency G-buffers Generation"
     reads = ("gbuffer.depth", Optional("brdf.albedo"), Optional("brdf.average"), Optional("brdf.energy"))
+    uniforms = KIND_UNIFORMS
     writes = (
+        Texture("translucent.set", "translucent_set", "as gbuffer.set", "r8", _screen,
+                when=lambda f: None if f.rig.linked else "every light lights everything"),
         Texture("translucent.depth", "translucent_depth", "view depth, world units; 0 where nothing refracts in front of "
                 "the opaque surface", "r32f", _screen),
         Texture("translucent.normal", "translucent_normal", "shading normal and triangle's normal, as gbuffer.normal",
@@ -153,19 +168,23 @@ def draw_for_camera(
     frame.gl.ctx.enable_only(mode)
     frame.gl.ctx.depth_func = ">" if far == 0.0 else "<"
     frame.bind(planned)
-    frame.gpu.draw(
-        planned,
-        {"vertex": "surface/surface_vert.glsl", "fragment": fragment},
-        CAMERA,
-        np.ascontiguousarray(frame.view["clip_from_world"]),
-        full=True,
-        only=only,
-        units=len(planned.texture_reads()),
-        defines={
+    stages = {"vertex": "surface/surface_vert.glsl", "fragment": fragment}
+    options = {
+        "full": True, "only": only, "units": len(planned.texture_reads()),
+        "defines": {
             "SURFACE_TABLES": int(planned.has("brdf.albedo")), "SURFACE_SEE_THROUGH_GLASS": 1, "SURFACE_SEEN_BY_CAMERA": 1,
             "SURFACE_SEEN_BY_SHADOW": 0, **(defines or {}),
         },
-    )  # fmt: skip
+    }  # fmt: skip
+    clip = np.ascontiguousarray(frame.view["clip_from_world"])
+    kinds: dict[tuple, list[int]] = {}
+    for bits in frame.gpu.bits(CAMERA):
+        kinds.setdefault((receiver_set(bits), bool(bits & CATCHER)), []).append(bits)
+    programs = frame.gpu.programs(planned, stages, CAMERA, **options) if KIND_UNIFORMS[0] in planned.task.uniforms else ()
+    for (lit_with, catcher), among in kinds.items():
+        for program in programs:
+            frame.set(program, object_set=lit_with / 255.0, object_catcher=float(catcher))
+        frame.gpu.draw(planned, stages, CAMERA, clip, among=tuple(among) if len(kinds) > 1 else None, **options)
     frame.gl.ctx.depth_func = "<"
 
 

@@ -10,7 +10,8 @@ from ..facts import Facts
 from ..frame import Frame
 from ..gpu_types import LIGHT, LIGHT_VIEW
 from ..graph import Buffer, Optional, Pass, Planned, Texture, Uniform
-from ..scene import DIFFUSE, SHADOW
+from ..lights import LightRig
+from ..scene import DIFFUSE, SHADOW, blocker_set, receiver_set
 
 _VERTEX = "surface/surface_vert.glsl"
 _UNIFORMS = (
@@ -71,9 +72,8 @@ class ShadowMaps(Pass):
             return _no_light(facts) or "no light casts shadows, or the RSMs serve for them"
         return None if facts.triangles else "the scene has no surfaces"
 
-    def run(self, frame: Frame, planned: Planned) -> None:
-        draw_light_maps(frame, planned, SHADOW,
-                        "passes/shadow_map_frag.glsl", full=False)
+    def run(self, frame: Frame, planned: Planned) -> bool:
+        return draw_light_maps(frame, planned, SHADOW, "passes/shadow_map_frag.glsl", full=False)
 
 
 class RSMGeneration(Pass):
@@ -95,7 +95,9 @@ class RSMGeneration(Pass):
         Buffer("rsm.views", "rsm_views", "what the maps show", "LightView", LIGHT_VIEW,
                lambda f: max(1, len(f.rig.bounce.sizes))),
     )  # fmt: skip
-    uniforms = _UNIFORMS
+    uniforms = (
+        *_UNIFORMS, Uniform("light_reaches", "float", "1 where the light shines on what is drawn, 0 where it is only blocked"),
+    )  # fmt: skip
     depends = ("lights", "world", "transforms", "meshes", "materials")
     settings = ("rsm.resolution", "world.resolution", "world.samples")
 
@@ -107,29 +109,53 @@ class RSMGeneration(Pass):
             return _no_light(facts)
         return None if facts.triangles else "the scene has no surfaces"
 
-    def run(self, frame: Frame, planned: Planned) -> None:
+    def run(self, frame: Frame, planned: Planned) -> bool:
         sample = frame.light_sample(bounce=True)
-        frame.upload("rsm.lights", sample.lights)
-        frame.upload("rsm.views", sample.views)
-        draw_light_maps(frame, planned, DIFFUSE, "passes/rsm_frag.glsl", full=True)
+        lights = (sample.lights.tobytes(), sample.views.tobytes())
+        same = planned.memory.get("lights") == lights and not planned.stale
+        if not same:
+            frame.upload("rsm.lights", sample.lights)
+            frame.upload("rsm.views", sample.views)
+            planned.memory["lights"] = lights
+        return draw_light_maps(frame, planned, DIFFUSE, "passes/rsm_frag.glsl", full=True) or not same
 
 
-def draw_light_maps(frame: Frame, planned: Planned, visibility: int, fragment: str, *, full: bool) -> None:
-    """Draw the views that are due into their tiles of the pass's targets: all of them when the pass is stale, else those
-    of lights that move between sub-frames. ``full`` evaluates every material (bounce maps), else only those that let
-    light through (shadow maps)."""
-    rig = planned.facts.rig
+def draw_light_maps(frame: Frame, planned: Planned, visibility: int, fragment: str, *, full: bool) -> bool:
+    """Draw the views that are due into their tiles of the pass's targets: all of them when surfaces have changed, else those
+    that look from elsewhere than the last time, which a light's power or the camera does not make them. False if none was.
+    ``full`` evaluates every material (bounce maps), else only those that let light through (shadow maps)."""
+    facts = planned.facts
+    maps = facts.rig.bounce if full else facts.rig.shadow
     sample = frame.light_sample(bounce=full)
-    moving = planned.facts.subframes > 1
-    due = [
-        i for i, view in enumerate(sample.views) if planned.stale or (moving and rig.moves(int(view["light"]), bounce=full))
-    ]  # fmt: skip
+    clips = [np.ascontiguousarray(clip.T, "f4") for clip in sample.clip_from_world]
+    boxes = [None if full else facts.rig.beyond(i, int(view["light"])) for i, view in enumerate(sample.views)]
+    bits = frame.gpu.bits(visibility)
+    links = [_linked(facts.rig, int(view["light"]), bits, full) for view in sample.views]
+    looks = [
+        (view.tobytes(), clip.tobytes(), None if box is None else box.tobytes(), link)
+        for view, clip, box, link in zip(sample.views, clips, boxes, links, strict=True)
+    ]
+    geometry = (facts.stamps[kind] for kind in ("transforms", "meshes", "materials"))
+    surfaces = (frame.targets(planned), tuple(maps.sizes), tuple(maps.corners), *geometry)
+    memory = planned.memory
+    clear = memory.pop("surfaces", None) != surfaces
+    old = [] if clear else memory["looks"]
+    due = [i for i, look in enumerate(looks) if i >= len(old) or old[i] != look]
+    if due or clear:
+        tiles = [(sample.views[i], clips[i], boxes[i], links[i]) for i in due]
+        _draw_tiles(frame, planned, visibility, fragment, full=full, clear=clear, tiles=tiles)
+    memory["surfaces"], memory["looks"] = surfaces, looks
+    return bool(due) or clear
+
+
+def _draw_tiles(frame: Frame, planned: Planned, visibility: int, fragment: str, *, full: bool, clear: bool, tiles: list) -> None:
+    """Draw ``tiles`` (view, clip from world, box left out, what of the scene) of a light map; ``clear`` wipes it before."""
     ctx = frame.gl.ctx
     fbo = frame.targets(planned)
     fbo.use()
     # Where a map shows nothing, a shadow map is far beyond every surface, and a bounce map has albedo (and alpha) 0.
     nothing = 0.0 if full else 1e30
-    if planned.stale:
+    if clear:
         fbo.scissor = None
         fbo.viewport = (0, 0, *fbo.size)
         fbo.clear(nothing, nothing, nothing, nothing, depth=1.0)
@@ -143,10 +169,9 @@ def draw_light_maps(frame: Frame, planned: Planned, visibility: int, fragment: s
     }  # fmt: skip
     stages = {"vertex": _VERTEX, "fragment": fragment}
     programs = frame.gpu.programs(planned, stages, visibility, **options)
-    for i in due:
-        view = sample.views[i]
+    for view, clip_from_world, beyond, linked in tiles:
         rect = tuple(int(v) for v in view["rect"])
-        if not planned.stale:
+        if not clear:
             fbo.clear(nothing, nothing, nothing, nothing, depth=1.0, viewport=rect)
         fbo.viewport = rect
         for program in programs:
@@ -156,6 +181,18 @@ def draw_light_maps(frame: Frame, planned: Planned, visibility: int, fragment: s
                 light_axis_ws=tuple(view["axis_z"]),
                 light_perspective=float(view["perspective"]),
             )
-        clip = np.ascontiguousarray(sample.clip_from_world[i].T, "f4")
-        beyond = None if full else rig.beyond(i, int(view["light"]))
-        frame.gpu.draw(planned, stages, visibility, clip, beyond=beyond, **options)
+        for reaches, among in linked:
+            for program in programs if full else ():
+                frame.set(program, light_reaches=reaches)
+            frame.gpu.draw(planned, stages, visibility, clip_from_world, beyond=beyond, among=among, **options)
+
+
+def _linked(rig: LightRig, index: int, bits: tuple[int, ...], full: bool) -> list[tuple[float, tuple[int, ...] | None]]:
+    """(whether source ``index`` lights them, visibility bits) of what its map shows: what shades it and, in a bounce map
+    (``full``), what it lights."""
+    lit = tuple(b for b in bits if rig.lights_kind(index, receiver_set(b)))
+    dark = tuple(b for b in bits if rig.blocked_by(index, blocker_set(b)) and b not in lit)
+    if not full:
+        shades = tuple(b for b in bits if rig.blocked_by(index, blocker_set(b)))
+        return [(1.0, None if shades == bits else shades)]
+    return [(1.0, None if lit == bits else lit), *([(0.0, dark)] if dark else [])]

@@ -48,7 +48,7 @@ SUBSURFACE = (
 )  # fmt: skip
 
 # Of a surface that reflects, besides where it is: its lobe (lib/bsdf_lib.glsl).
-LOBE = ("gbuffer.specular", "gbuffer.lobe", "brdf.energy", "brdf.average")
+LOBE = ("gbuffer.specular", "gbuffer.lobe", "brdf.albedo", "brdf.energy", "brdf.average")
 # What scatters below a surface: its own light.
 SCATTERED = (
     Optional("direct.diffuse", ("subsurface.direct",)), Optional("indirect.diffuse", ("subsurface.indirect",)),

@@ -3,63 +3,56 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from ..facts import Facts
+from ..facts import Domain, Facts
 from ..frame import Frame
 from ..graph import Optional, Planned, Texture, Uniform
 from ..materials import Medium
 from ..sequence import sobol_2d
 from .screen import ScreenPass, _screen
 
-_EVERYWHERE = 1e30
 
-
-@dataclass(frozen=True)
-class Air:
-    """A homogeneous ``medium`` and the box (2, 3) in world space that it fills."""
-
-    medium: Medium
-    box: np.ndarray
-
-
-def air(facts: Facts) -> Air | None:
-    """What fills the scene: the world's own medium, everywhere; else a volume object's, in its box; else the setting's haze,
-    in the scene's bounds."""
+def air(facts: Facts) -> tuple[Domain, ...]:
+    """What fills the scene: the world's own medium and those of volume objects; where there are none, the setting's haze, in
+    the scene's bounds. The world's comes first, then the largest."""
     volume = facts.settings.volume
     if not facts.settings.use_volumetric:
-        return None
-    if facts.medium is not None:
-        everywhere = np.array([[-_EVERYWHERE] * 3, [_EVERYWHERE] * 3])
-        return Air(facts.medium, everywhere if facts.medium_box is None else facts.medium_box)
+        return ()
+    if facts.media:
+        return facts.media
     if volume.density > 0.0:
-        return Air(Medium((volume.density,) * 3, (0.0,) * 3, anisotropy=volume.anisotropy), facts.rig.bounds)
-    return None
+        low, high = facts.rig.bounds
+        unit = np.diag([*(2.0 / np.maximum(high - low, 1e-30)), 1.0])
+        unit[:3, 3] = -(low + high) / np.maximum(high - low, 1e-30)
+        return (Domain(Medium((volume.density,) * 3, (0.0,) * 3, anisotropy=volume.anisotropy), unit),)
+    return ()
 
 
 MEDIUM_UNIFORMS = (
-    Uniform("medium_low_ws", "vec3", "corner of the box that the medium fills, world space, m"),
-    Uniform("medium_high_ws", "vec3", "the opposite corner"),
-    Uniform("medium_extinction", "vec3", "share of light lost per metre of it"),
+    Uniform("medium_unit_from_world[MEDIA]", "mat4", "the medium's space from the world's; all 0 where it fills the world"),
+    Uniform("medium_extinction[MEDIA]", "vec4", "share of light lost per metre of it; 1 where it fills a ball, 0 a cube"),
+    Uniform("medium_scattering[MEDIA]", "vec4", "share scattered per metre; mean cosine of the scattering angle"),
+    Uniform("medium_emission[MEDIA]", "vec3", "radiance emitted per metre, W/(m³·sr)"),
 )
 
 
 def medium_defines(facts: Facts) -> dict[str, int]:
-    """``HAS_MEDIUM``: whether there is any."""
-    return {"HAS_MEDIUM": int(air(facts) is not None)}
+    """``HAS_MEDIUM``: whether there is any; ``MEDIA``: how many, at least 1."""
+    return {"HAS_MEDIUM": int(bool(air(facts))), "MEDIA": max(1, len(air(facts)))}
 
 
 def set_medium(frame: Frame, program, facts: Facts) -> None:
     """Set MEDIUM_UNIFORMS where there is a medium."""
     found = air(facts)
-    if found is not None:
+    if found:
+        media, spaces = [d.medium for d in found], [d.unit_from_world for d in found]
         frame.set(
             program,
-            medium_low_ws=tuple(float(v) for v in found.box[0]),
-            medium_high_ws=tuple(float(v) for v in found.box[1]),
-            medium_extinction=tuple(float(v) for v in found.medium.extinction),
+            medium_unit_from_world=np.stack([np.zeros((4, 4)) if s is None else s.T for s in spaces]),
+            medium_extinction=np.array([(*d.medium.extinction, d.ball) for d in found]),
+            medium_scattering=np.array([(*m.scattering, m.anisotropy) for m in media]),
+            medium_emission=np.array([m.emission for m in media]),
         )
 
 
@@ -79,9 +72,6 @@ class Volumetric(ScreenPass):
     )  # fmt: skip
     uniforms = (
         *MEDIUM_UNIFORMS,
-        Uniform("medium_scattering", "vec3", "share of light scattered per metre"),
-        Uniform("medium_emission", "vec3", "radiance emitted per metre, W/(m³·sr)"),
-        Uniform("medium_anisotropy", "float", "mean cosine of the scattering angle"),
         Uniform("light_count", "int", "lights in the list"),
         Uniform("step_count", "int", "points tested on each ray for each light"),
         Uniform("step_turn", "float", "where in its stratum each point lies in this sub-frame, [0, 1)"),
@@ -89,22 +79,18 @@ class Volumetric(ScreenPass):
     fragment = "passes/volumetric_frag.glsl"
 
     def defines(self, facts: Facts) -> dict[str, int]:
-        return {"RADIAL_BLUR": 0, "VOXEL_VISIBILITY": 0}
+        return {**medium_defines(facts), "RADIAL_BLUR": 0, "VOXEL_VISIBILITY": 0}
 
     def absent(self, facts: Facts) -> str | None:
         if not facts.settings.use_volumetric:
             return "volumetric light is switched off"
-        return None if air(facts) is not None else "neither the world nor an object is a volume, and volume.density is 0"
+        return None if air(facts) else "neither the world nor an object is a volume, and volume.density is 0"
 
     def prepare(self, frame: Frame, planned: Planned, program) -> None:
         facts = planned.facts
-        medium = air(facts).medium
         set_medium(frame, program, facts)
         frame.set(
             program,
-            medium_scattering=tuple(float(v) for v in medium.scattering),
-            medium_emission=tuple(float(v) for v in medium.emission),
-            medium_anisotropy=float(medium.anisotropy),
             light_count=len(facts.rig.sources),
             step_count=facts.settings.volume.samples,
             step_turn=float(sobol_2d(frame.subframe, 8)[0]),

@@ -1,23 +1,38 @@
-// A homogeneous medium: Beer and Lambert's law, and the phase function of L. Henyey and J. Greenstein, "Diffuse Radiation
-// in the Galaxy", Astrophysical Journal 93, 1941. Included where the uniforms medium_* are declared. The medium fills a box;
-// the world's fills all space (a box of ± 1e30), where nothing from infinitely far away arrives, as in Cycles.
+// Homogeneous media: Beer and Lambert's law, and the phase function of L. Henyey and J. Greenstein, "Diffuse Radiation in the
+// Galaxy", Astrophysical Journal 93, 1941. Included where the uniforms medium_* are declared. A medium fills a cube or a ball of
+// a space of its own; the world's fills all of it (a matrix of zeros: every point is the cube's middle), where nothing from
+// infinitely far away arrives, as in Cycles. Where media overlap they add up.
 
-// Where the ray is inside the box: distances (in, out), out < in if it misses. `direction` need not be a unit vector.
-vec2 medium_span(vec3 origin_ws, vec3 direction)
+// Where the ray is inside medium k: distances (in, out), out < in if it misses. `direction` need not be a unit vector.
+vec2 medium_span(int k, vec3 origin_ws, vec3 direction)
 {
-    vec3 inverse = 1.0 / mix(direction, vec3(1e-20), lessThan(abs(direction), vec3(1e-20)));
-    vec3 a = (medium_low_ws - origin_ws) * inverse;
-    vec3 b = (medium_high_ws - origin_ws) * inverse;
-    vec3 near = min(a, b);
-    vec3 far = max(a, b);
+    vec3 o = (medium_unit_from_world[k] * vec4(origin_ws, 1.0)).xyz;
+    vec3 d = mat3(medium_unit_from_world[k]) * direction;
+    if (medium_extinction[k].w > 0.5) {
+        float a = max(dot(d, d), 1e-30);
+        float b = dot(o, d) / a;
+        vec3 nearest = o - b * d;
+        float inside = 1.0 - dot(nearest, nearest);
+        float half_ = sqrt(max(inside, 0.0) / a);
+        return inside > 0.0 ? vec2(-b - half_, -b + half_) : vec2(1.0, -1.0);
+    }
+    vec3 inverse = 1.0 / mix(d, vec3(1e-30), lessThan(abs(d), vec3(1e-30)));
+    vec3 from = (-1.0 - o) * inverse;
+    vec3 to = (1.0 - o) * inverse;
+    vec3 near = min(from, to);
+    vec3 far = max(from, to);
     return vec2(max(near.x, max(near.y, near.z)), min(far.x, min(far.y, far.z)));
 }
 
 // Share of light that is left after `distance` (m) along a unit `direction`; `distance` may be 1e30.
 vec3 medium_transmittance(vec3 origin_ws, vec3 direction, float distance)
 {
-    vec2 span = medium_span(origin_ws, direction);
-    return exp(-medium_extinction * max(min(span.y, distance) - max(span.x, 0.0), 0.0));
+    vec3 depth = vec3(0.0);
+    for (int k = 0; k < MEDIA; ++k) {
+        vec2 span = medium_span(k, origin_ws, direction);
+        depth += medium_extinction[k].rgb * max(min(span.y, distance) - max(span.x, 0.0), 0.0);
+    }
+    return exp(-depth);
 }
 
 // Per sr; `cos_angle` between where the light came from going and where it goes.

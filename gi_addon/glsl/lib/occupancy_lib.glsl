@@ -29,6 +29,21 @@ float cells_step(vec3 p, vec3 inverse, vec3 forward, float level)
 // A surface's point lifted clear of the cells that the surface fills.
 vec3 cells_clear(vec3 position_ws, vec3 n) { return position_ws + n * (dot(abs(n), vec3(1.0)) * cell_size); }
 
+// The same, where another surface may stand nearer than that: on along `open`, a unit direction in which nothing stands near
+// (towards the light or the eye that sees the point), to the first free cell. What stands around a point in a free cell then
+// blocks, and a wall that its cell lies in does not stand open to it.
+vec3 cells_clear_along(vec3 position_ws, vec3 n, vec3 open)
+{
+    vec3 start = (cells_clear(position_ws, n) - cell_origin_ws) / cell_size;
+    vec3 found = start;
+    for (int k = 4; k >= 0; --k) {
+        // Whole cells: steps of a cell's edge enter no cell but through a corner without stopping in it.
+        vec3 p = start + open * float(k);
+        found = cells_level(p) > 0.5 ? p : found;
+    }
+    return cell_origin_ws + found * cell_size;
+}
+
 // The distance (in cells) at which a ray from `start` (in cells) enters the grid, and the one at which it leaves.
 vec2 cells_span(vec3 start, vec3 inverse)
 {

@@ -24,7 +24,7 @@ void main()
 {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
     vec2 uv = gl_FragCoord.xy * view.inverse_resolution;
-    vec2 depth_bulge = texelFetch(gbuf_depth, pixel, 0).rg;
+    vec2 depth_bulge = max(texelFetch(gbuf_depth, pixel, 0).rg, 0.0); // below 0 are marks
     float depth = depth_bulge.r;
     float turn = filter_turn + TAU * unit_float(hash_u32(uvec2(pixel + view.pixel_offset)));
     vec3 diffuse = vec3(0.0);
@@ -43,8 +43,16 @@ void main()
         bool has_lobe = lobe_reflects(lobe);
         vec3 gain = has_lobe ? multiscatter_gain(brdf_energy, brdf_average, lobe, saturate(abs(dot(n, v)))) : vec3(0.0);
 #endif
+#if HAS_GBUF_SET
+        uint lit_with = uint(texelFetch(gbuf_set, pixel, 0).r * 255.0 + 0.5);
+#endif
         for (int i = 0; i < light_count; ++i) {
             Light light = lights[i];
+#if HAS_GBUF_SET
+            if ((light.receivers >> lit_with & 1u) == 0u) {
+                continue;
+            }
+#endif
             vec3 l;
             float angle;
             vec3 arriving = light_arriving(light, position_ws, l, angle);
@@ -80,13 +88,16 @@ void main()
             }
 #endif
         }
-        diffuse = lit_light * INV_PI;
 #if HAS_WORLD_DIFFERENCE
-        diffuse += texelFetch(world_difference, pixel, 0).rgb;
+        lit_light += PI * texelFetch(world_difference, pixel, 0).rgb;
 #endif
 #if HAS_SCREEN_LIGHT
-        diffuse += texelFetch(screen_light, pixel, 0).rgb; // the world and emissive pixels, where screen space gathers them
+        // The world and emissive pixels, where screen space gathers them; of that only what arrives is known.
+        vec3 gathered = PI * texelFetch(screen_light, pixel, 0).rgb;
+        lit_light += gathered;
+        open_light += gathered;
 #endif
+        diffuse = lit_light * INV_PI;
     }
 #if HAS_DIRECT_DIFFUSE
     direct_diffuse = vec4(diffuse, 1.0);

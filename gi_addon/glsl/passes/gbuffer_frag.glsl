@@ -5,6 +5,10 @@
 // (32 bit) on the pixel's ray, and normals are in world space.
 
 #include "surface/surface_point.glsl"
+#if LAYER > 1
+#include "engines/ssdo/screen_lib.glsl"
+#include "engines/ssdo/layer_lib.glsl"
+#endif
 
 void main()
 {
@@ -17,6 +21,13 @@ void main()
     if (depth < view.clip_start || depth > view.clip_end) {
         discard;
     }
+#if LAYER > 1
+    // By more than rounding: the layer before is drawn by another program.
+    float before = texelFetch(PLANES_BEFORE, ivec2(gl_FragCoord.xy), 0).x;
+    if (before <= 0.5 * NOTHING || depth <= depth_of_nearness(before) * 1.00001) {
+        discard;
+    }
+#endif
 #if SURFACE_TRANSPARENT
     if (!surface_is_there(opacity, 0u)) {
         discard;
@@ -27,16 +38,29 @@ void main()
     if (held) {
         c = closure_none();
     }
+    if (object_catcher > 0.5) {
+        c = closure_none(); // nothing of its own: the film asks for its shadow
+    }
     float gain = opacity > 0.0 ? 1.0 / opacity : 1.0;
     vec3 n = safe_normalize(c.normal_ws);
     if (dot(n, n) < 0.5) {
         n = p.normal_ws;
     }
+    vec3 ng = p.geometric_normal_ws;
+#if LAYER > 1
+    // The eye is on neither side of what it does not see: the front counts, as it is modelled.
+    float front = 1.0 - 2.0 * p.backfacing;
+    n *= front;
+    ng *= front;
+#endif
     // Rounding of the interpolants alone lifts flat triangles by parts in a million of their place.
     float bulge = surface_bulge();
-    gbuf_depth = vec2(depth, held ? -1.0 : bulge > 1e-5 * length(vary_relative_ws) ? bulge : 0.0);
+    gbuf_depth = vec2(depth, object_catcher > 0.5 ? -2.0 : held ? -1.0 : bulge > 1e-5 * length(vary_relative_ws) ? bulge : 0.0);
+#if HAS_GBUF_SET
+    gbuf_set = object_set;
+#endif
 #if HAS_GBUF_NORMAL
-    gbuf_normal = vec4(octahedral_encode(n), octahedral_encode(p.geometric_normal_ws));
+    gbuf_normal = vec4(octahedral_encode(n), octahedral_encode(ng));
 #endif
 #if HAS_GBUF_DIFFUSE
     gbuf_diffuse = vec4(c.diffuse * gain, 1.0);

@@ -28,11 +28,19 @@ void main()
     vec2 uv = (vec2(pixel) + 0.5) * view.inverse_resolution;
     float depth = 0.0;
     bool held = false;
+    bool catcher = false;
 #if HAS_GBUF_DEPTH
     depth = texelFetch(gbuf_depth, pixel, 0).r;
-    held = texelFetch(gbuf_depth, pixel, 0).g < 0.0;
+    float mark = texelFetch(gbuf_depth, pixel, 0).g;
+    held = mark == -1.0;
+    catcher = mark == -2.0;
 #endif
-    bool surface = depth > 0.0;
+    bool surface = depth > 0.0 && !catcher;
+    // A shadow catcher is not there but for its shadow: over the world, or as the picture's alpha.
+    vec3 lit_share = vec3(1.0);
+#if HAS_DIRECT_SHADOW
+    lit_share = catcher ? texelFetch(direct_shadow, pixel, 0).rgb : lit_share;
+#endif
 
     vec3 diffuse_color = vec3(0.0);
     vec3 diffuse_direct = vec3(0.0);
@@ -79,7 +87,7 @@ void main()
         emission = texelFetch(gbuf_emission, pixel, 0).rgb;
 #endif
     } else if (view.film_transparent < 0.5 && WORLD_VISIBLE != 0) {
-        environment = world_radiance(normalize(ray_direction_ws(uv)));
+        environment = world_radiance(normalize(ray_direction_ws(uv))) * lit_share;
     }
 #if HAS_GBUF_TRANSMISSION
     // Behind a refracting surface everything belongs to Transmission: what the technique found along the refracted ray, or
@@ -136,7 +144,7 @@ void main()
     environment *= passes;
 
 #if LAYER_COMBINED >= 0
-    float alpha = !held && (surface || view.film_transparent < 0.5) ? 1.0 : 0.0;
+    float alpha = !held && (surface || view.film_transparent < 0.5) ? 1.0 : catcher ? saturate(1.0 - vector_mean(lit_share)) : 0.0;
     add(LAYER_COMBINED, pixel, vec4(diffuse_direct + diffuse_indirect + glossy_direct + glossy_indirect +
                                         through_direct + through_indirect + volume + emission + environment,
                                     alpha));

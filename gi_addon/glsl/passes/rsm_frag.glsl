@@ -37,7 +37,7 @@ void main()
     rsm_normal = vec4(octahedral_encode(n), octahedral_encode(ng));
 #endif
 #if HAS_RSM_ALBEDO
-    rsm_albedo = vec4(albedo * gain, 1.0);
+    rsm_albedo = vec4(albedo * gain * light_reaches, 1.0); // light linking: it may only be in the way
 #endif
 #if HAS_RSM_DEPTH
     rsm_depth = dot(vary_position_ws - light_origin_ws, light_axis_ws);

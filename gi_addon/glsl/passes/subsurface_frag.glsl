@@ -107,6 +107,23 @@ Inside inside_at(vec3 offset, vec3 start_ws, ivec2 start, int light)
 float depth_inside(Inside r) { return min(r.near, min(r.far, r.lit)); }
 
 #if HAS_RSM_DEPTH
+// Texels of the light's map are this wide at a point, m.
+float texel_width_at(int index, vec3 position_ws)
+{
+    LightView v = rsm_views[index];
+    return light_view_texel_width(v, dot(position_ws - v.origin_ws, v.axis_z));
+}
+
+// Whether the light shines on the back of a sheet without thickness: as far below as can be told, its map says outside, and
+// the picture does not. Such a sheet has no inside that ends there; Cycles' walk goes on into the void.
+bool behind_a_sheet(int light, vec3 position_ws, vec3 ng, ivec2 pixel)
+{
+    int index = rsm_view_of(rsm_lights[light], position_ws);
+    float doubt = pixel_width(view_depth(position_ws)) + texel_width_at(index, position_ws);
+    Inside below = inside_at(-2.0 * doubt * ng, position_ws, pixel, light);
+    return below.lit < 0.0 && below.far >= 0.0;
+}
+
 float arriving_here(int light, vec3 position_ws)
 {
     vec3 l;
@@ -170,12 +187,16 @@ void main()
                 }
             }
 #endif
+#if HAS_RSM_DEPTH
+            light = light >= 0 && behind_a_sheet(light, position_ws, ng, pixel) ? -1 : light;
+#endif
             vec2 u = fract(sobol_2d(view.subframe * uint(WALKS) + uint(k), 42u) + turn);
             vec3 direction = frame * refract(-v, ggx_sample_visible_normal(v, rough, u), 1.0 / eta);
             vec3 offset = vec3(0.0);
             vec3 before = vec3(0.0);
             bool walking = path > 0.0 && dot(direction, ng) < 0.0;
             bool left = false;
+            int turns = 0;
             if (path <= 0.0) {
                 // No medium in this channel: light leaves where it enters.
                 left = true;
@@ -191,6 +212,7 @@ void main()
                         left = true;
                     } else {
                         weight *= alpha;
+                        ++turns;
                         if (inside > DEEP * path && inside < FAR) {
                             float radius = EMPTY * inside;
                             offset += draw_direction(state) * radius;
@@ -218,12 +240,13 @@ void main()
                 vec3 y = position_ws + before;
                 float doubt = pixel_width(view_depth(y));
 #if HAS_RSM_DEPTH
-                if (at.view >= 0) {
-                    LightView from = rsm_views[at.view];
-                    doubt += light_view_texel_width(from, dot(y - from.origin_ws, from.axis_z));
-                }
+                doubt += at.view >= 0 ? texel_width_at(at.view, y) : 0.0;
 #endif
                 weight /= surface_albedo * float(WALKS);
+                // No nearer than can be told, by the light's map alone, and before it turned: the surface that it entered by.
+                if (turns == 0 && path > 0.0 && beyond.lit < 0.0 && beyond.far >= 0.0 && length(before) < doubt) {
+                    weight = vec3(0.0);
+                }
                 if (at.pixel.x >= 0 && (beyond.near < 0.0 || (at.near <= min(doubt, at.far) && beyond.far >= 0.0))) {
 #if HAS_DIRECT_DIFFUSE
                     direct += weight * texelFetch(direct_diffuse, at.pixel, 0).rgb;

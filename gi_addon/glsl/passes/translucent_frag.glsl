@@ -35,6 +35,9 @@ void main()
 #if HAS_TRANSLUCENT_BACK_NORMAL
     translucent_back_normal = vec4(octahedral_encode(n), octahedral_encode(p.geometric_normal_ws));
 #endif
+#if HAS_TRANSLUCENT_SET
+    translucent_set = object_set;
+#endif
 #if HAS_TRANSLUCENT_DEPTH
     translucent_depth = depth;
 #endif

@@ -26,8 +26,16 @@ void main()
     vec3 n = -octahedral_decode(normals.xy);
     vec3 ng = -octahedral_decode(normals.zw);
     vec3 irradiance = vec3(0.0);
+#if HAS_TRANSLUCENT_SET
+    uint lit_with = uint(texelFetch(translucent_set, pixel, 0).r * 255.0 + 0.5);
+#endif
     for (int i = 0; i < light_count; ++i) {
         Light light = lights[i];
+#if HAS_TRANSLUCENT_SET
+        if ((light.receivers >> lit_with & 1u) == 0u) {
+            continue;
+        }
+#endif
         vec3 l;
         float angle;
         vec3 arriving = light_arriving(light, position_ws, l, angle);

@@ -76,7 +76,8 @@ vec2 lit_span(Light light, vec3 origin_ws, vec3 direction, vec2 span)
     return da > 0.0 ? vec2(max(span.x, t.y), span.y) : vec2(span.x, min(span.y, t.x));
 }
 
-vec3 scattered(Light light, vec3 origin_ws, vec3 direction, vec2 span, float offset)
+// Scattered by medium k, which the ray crosses in `span`.
+vec3 scattered(Light light, int k, vec3 origin_ws, vec3 direction, vec2 span, float offset)
 {
     span = lit_span(light, origin_ws, direction, span);
     if (span.y <= span.x) {
@@ -89,11 +90,11 @@ vec3 scattered(Light light, vec3 origin_ws, vec3 direction, vec2 span, float off
     float nearest = max(length(to_light - direction * delta), 1e-6 * view.scene_radius);
     float phi_a = atan((span.x - delta) / nearest);
     float phi_b = span.y >= 1e29 ? 0.5 * PI : atan((span.y - delta) / nearest);
-    float sigma = max(vector_mean(medium_extinction), 1e-12);
+    float sigma = max(vector_mean(medium_extinction[k].rgb), 1e-12);
     float passed = 1.0 - exp(-sigma * (span.y - span.x));
     vec3 sum = vec3(0.0);
-    for (int k = 0; k < step_count; ++k) {
-        float u = (float(k) + offset) / float(step_count);
+    for (int i = 0; i < step_count; ++i) {
+        float u = (float(i) + offset) / float(step_count);
         float t, weight;
         if (parallel) {
             float rest = max(1.0 - u * passed, 1e-7);
@@ -109,13 +110,12 @@ vec3 scattered(Light light, vec3 origin_ws, vec3 direction, vec2 span, float off
         float angle;
         vec3 arriving = light_arriving(light, p, l, angle);
         if (max3(arriving) > 0.0) {
-            vec3 left = medium_transmittance(p, l, light_distance(light, p)) * exp(-medium_extinction * (t - max(span.x, 0.0)));
-            // The span begins where the light's part of the ray does, not where the medium does.
+            vec3 left = medium_transmittance(p, l, light_distance(light, p)) * medium_transmittance(origin_ws, direction, t);
             sum += arriving * left * (weight * air_visibility(light, p) *
-                                      henyey_greenstein(dot(l, direction), medium_anisotropy));
+                                      henyey_greenstein(dot(l, direction), medium_scattering[k].w));
         }
     }
-    return sum * medium_transmittance(origin_ws, direction, span.x) / float(step_count);
+    return sum * medium_scattering[k].rgb / float(step_count);
 }
 #endif
 
@@ -132,33 +132,39 @@ void main()
     vec3 direction = ray / scale;
     vec3 origin_ws = ray_origin_ws(uv) + ray * view.clip_start;
     float end = depth > 0.0 ? (depth - view.clip_start) * scale : 1e30;
-    vec2 span = medium_span(origin_ws, direction);
-    span = vec2(max(span.x, 0.0), min(span.y, end));
-    float length_ = max(span.y - span.x, 0.0);
-    vec3 passes = exp(-medium_extinction * length_);
+    vec3 passes = medium_transmittance(origin_ws, direction, end);
 #if HAS_VOLUME_TRANSMITTANCE
     volume_transmittance = vec4(passes, 1.0);
 #endif
 #if HAS_VOLUME_LIGHT
-    // Emission: ∫ ε T dt = ε (1 − T)/σ.
-    vec3 emitted = mix((1.0 - passes) / max(medium_extinction, vec3(1e-12)), vec3(length_),
-                       lessThan(medium_extinction * length_, vec3(1e-4)));
     vec3 light_sum = vec3(0.0);
 #if HAS_LIGHTS
     float offset = fract(step_turn + unit_float(hash_u32(uvec2(pixel + view.pixel_offset))));
-    if (length_ > 0.0 && max3(medium_scattering) > 0.0) {
-        for (int i = 0; i < light_count; ++i) {
-#if RADIAL_BLUR
-            float share = radial_visibility(lights[i], offset);
-            light_sum += share > 0.0 ? share * scattered(lights[i], origin_ws, direction, span, offset) : vec3(0.0);
-#else
-            light_sum += scattered(lights[i], origin_ws, direction, span, offset);
 #endif
+    for (int k = 0; k < MEDIA; ++k) {
+        vec2 span = medium_span(k, origin_ws, direction);
+        span = vec2(max(span.x, 0.0), min(span.y, end));
+        float length_ = max(span.y - span.x, 0.0);
+        if (any(greaterThan(medium_emission[k], vec3(0.0)))) {
+            // Emission: ∫ ε T dt = ε (1 − T)/σ.
+            vec3 sigma = medium_extinction[k].rgb;
+            vec3 emitted = mix((1.0 - exp(-sigma * length_)) / max(sigma, vec3(1e-12)), vec3(length_),
+                               lessThan(sigma * length_, vec3(1e-4)));
+            light_sum += medium_emission[k] * emitted * medium_transmittance(origin_ws, direction, span.x);
         }
-    }
+#if HAS_LIGHTS
+        if (length_ > 0.0 && max3(medium_scattering[k].rgb) > 0.0) {
+            for (int i = 0; i < light_count; ++i) {
+#if RADIAL_BLUR
+                float share = radial_visibility(lights[i], offset);
+                light_sum += share > 0.0 ? share * scattered(lights[i], k, origin_ws, direction, span, offset) : vec3(0.0);
+#else
+                light_sum += scattered(lights[i], k, origin_ws, direction, span, offset);
 #endif
-    bool glows = any(greaterThan(medium_emission, vec3(0.0)));
-    volume_light = vec4(light_sum * medium_scattering + (glows ? medium_emission * emitted : vec3(0.0)),
-                        dot(passes, vec3(1.0 / 3.0)));
+            }
+        }
+#endif
+    }
+    volume_light = vec4(light_sum, dot(passes, vec3(1.0 / 3.0)));
 #endif
 }

@@ -26,9 +26,11 @@ void main()
         vec3 plane = share > 0.0 ? vec3(sum_at(sheet + 1u), sum_at(sheet + 2u), sum_at(sheet + 3u)) / share : vec3(0.0);
         kinds |= bits != 0u && opaque > 0.0 ? 1u << part : 0u;
         ivec3 texel = ivec3(cell.x + (part & 1) * grid_size.x, cell.y, cell.z + (part >> 1) * grid_size.z);
+#if HAS_VOXEL_EXTENTS
         uint reach = sheet_extent(first, part);
         imageStore(voxel_extents, texel, vec4(voxel_sums[reach], voxel_sums[reach + 1u], voxel_sums[reach + 2u],
                                               voxel_sums[reach + 3u]) / EXTENT_UNITS);
+#endif
         imageStore(voxel_sheets, texel, vec4(0.5 + 0.5 * plane.xy, 0.5 + plane.z / 3.0, float(bits) / 65535.0));
     }
     imageStore(voxel_kinds, cell, vec4(float(kinds) / 255.0, opaque / max(weight, 1.0), 0.0, 0.0));

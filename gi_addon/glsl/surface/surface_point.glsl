@@ -67,11 +67,12 @@ float surface_bulge() { return max(0.5 * (vary_height - dot(vary_relative_ws, va
 float surface_opacity(Closure c)
 {
     float through = vector_mean(c.transparent);
-#if SURFACE_SEE_THROUGH_GLASS
-    through += vector_mean(c.transmission);
-#endif
 #if SURFACE_SEEN_BY_CAMERA
-    through += vector_mean(c.translucent); // shaded with the refracting surfaces; to light it is as solid as paper
+    // What refracts or scatters on is shaded with its tint, and by the brightest channel no tint is over 1: behind many
+    // panes or leaves the product of tints would be rare and huge. To light, what scatters on is as solid as paper.
+    through += max3(c.transmission + c.translucent);
+#elif SURFACE_SEE_THROUGH_GLASS
+    through += vector_mean(c.transmission);
 #endif
     return saturate(1.0 - through);
 }

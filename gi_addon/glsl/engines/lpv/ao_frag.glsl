@@ -19,7 +19,7 @@ void main()
     vec4 normals = texelFetch(gbuf_normal, pixel, 0);
     vec3 ng = octahedral_decode(normals.zw);
     mat3 frame = frame_from_normal(octahedral_decode(normals.xy));
-    vec3 from = (position_ws_from_depth(uv, depth) - grid_origin) / grid_cell + ng * half_cell_shift(ng);
+    vec3 position_ws = position_ws_from_depth(uv, depth);
     // 16 rotations over 4 × 4 pixels, which the blur evens out.
     ivec2 block = (pixel + view.pixel_offset) & 3;
     float turn = float(block.y * 4 + block.x) / 16.0;
@@ -27,7 +27,7 @@ void main()
     for (int i = 0; i < ao_directions; ++i) {
         vec2 u = fract(sobol_2d(view.subframe * uint(ao_directions) + uint(i), 20u) + vec2(turn, turn * 7.0)); // 7: prime to 16
         vec3 direction = frame * warp_cosine_hemisphere(u);
-        sum += dot(direction, ng) > 0.0 ? open_share(from, direction, ao_distance / grid_cell) : 0.0;
+        sum += dot(direction, ng) > 0.0 ? open_share(position_ws, ng, direction, ao_distance) : 0.0;
     }
     ao_raw = vec2(sum / float(ao_directions), 1.0);
 }

@@ -30,7 +30,7 @@ bool wall_near(vec3 at, vec3 direction, out vec3 place, out vec3 n, out vec3 alb
         if (found || !inside_grid(ivec3(upper), grid_size) || upper[axis] < 1.0) {
             continue;
         }
-        int face = face_index(ivec3(upper), axis, grid_size);
+        int face = face_index(ivec3(upper), axis);
         vec4 wall = lpv_walls[face];
         if (wall.x > 0.0) {
             found = true;
@@ -47,14 +47,20 @@ bool wall_near(vec3 at, vec3 direction, out vec3 place, out vec3 n, out vec3 alb
 
 vec3 ray_bounces(vec3 position_ws, vec3 normal_ws, vec3 albedo, vec3 direction, float u)
 {
-    vec3 at = (position_ws - grid_origin) / grid_cell;
-    vec3 n = normal_ws;
-    if (albedo.r < 0.0) {
-        vec3 place;
-        if (!wall_near(at, direction, place, n, albedo)) {
-            return vec3(0.0);
-        }
-        at -= n * dot(at - place, n);
+    if (albedo.r >= 0.0) {
+        return albedo * volume_light(position_ws, normal_ws, -direction, normal_ws);
     }
+    // The finest grid that has the point well inside.
+    int k = LPV_GRIDS - 1;
+    for (int i = 0; i < LPV_GRIDS; ++i) {
+        use_grid(k);
+        k -= k > 0 && grid_share((position_ws - grid_origin) / grid_cell) < 0.5 ? 1 : 0;
+    }
+    vec3 at = (position_ws - grid_origin) / grid_cell;
+    vec3 n, place;
+    if (!wall_near(at, direction, place, n, albedo)) {
+        return vec3(0.0);
+    }
+    at -= n * dot(at - place, n);
     return albedo * volume_irradiance(volume_in_front(at, n, -direction), n);
 }

@@ -21,7 +21,7 @@ float order_4(ivec3 cell, vec3 w)
         ivec3 upper = cell;
         upper[axis] += i & 1;
         if (upper[axis] > 0 && upper[axis] < grid_size[axis]) {
-            vec4 wall = lpv_walls[face_index(upper, axis, grid_size)];
+            vec4 wall = lpv_walls[face_index(upper, axis)];
             sum += wall_normal(wall, axis) * ((i & 1) == 1 ? -wall.x : wall.x);
             covered += wall.x;
         }
@@ -51,7 +51,7 @@ void main()
     vec3 sum = vec3(0.0);
     vec3 flux = vec3(0.0); // × Y00
     for (int c = 0; c < SH_COUNT; ++c) {
-        ivec3 texel = ivec3(at.xy, z + c * grid_size.z);
+        ivec3 texel = volume_texel(ivec3(at.xy, z), c);
 #if HAS_LPV_BOUNCED
         vec3 value = bounced == 1 ? imageLoad(lpv_bounced, texel).rgb : source_scale * texelFetch(lpv_source, texel, 0).rgb;
 #else
@@ -64,8 +64,8 @@ void main()
         sum += flux * order_4(ivec3(at.xy, z), w);
     }
 #if LPV_LIMITED
-    imageStore(lpv_emitted, at, vec4(sum, 0.0));
+    imageStore(lpv_emitted, volume_texel(at, 0), vec4(sum, 0.0));
 #else
-    imageStore(lpv_radiance, at, vec4(sum, 0.0));
+    imageStore(lpv_radiance, volume_texel(at, 0), vec4(sum, 0.0));
 #endif
 }

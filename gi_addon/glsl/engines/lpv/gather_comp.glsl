@@ -12,10 +12,10 @@ void main()
     }
     vec3 sum[SH_COUNT];
     for (int c = 0; c < SH_COUNT; ++c) {
-        sum[c] = batch_first == 0 ? vec3(0.0) : imageLoad(lpv_volume, cell + ivec3(0, 0, c * grid_size.z)).rgb;
+        sum[c] = batch_first == 0 ? vec3(0.0) : imageLoad(lpv_volume, volume_texel(cell, c)).rgb;
     }
     for (int i = 0; i < batch_count; ++i) {
-        vec3 value = imageLoad(lpv_radiance, cell + ivec3(0, 0, i * grid_size.z)).rgb;
+        vec3 value = imageLoad(lpv_radiance, volume_texel(cell, i)).rgb;
         vec4 ordinate = ordinates[batch_first + i];
         float y[SH_COUNT];
         sh_basis(ordinate.xyz, y);
@@ -24,6 +24,6 @@ void main()
         }
     }
     for (int c = 0; c < SH_COUNT; ++c) {
-        imageStore(lpv_volume, cell + ivec3(0, 0, c * grid_size.z), vec4(sum[c], 0.0));
+        imageStore(lpv_volume, volume_texel(cell, c), vec4(sum[c], 0.0));
     }
 }

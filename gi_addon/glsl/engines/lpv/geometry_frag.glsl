@@ -34,7 +34,7 @@ void main()
         return;
     }
     ivec2 point = ivec2(gl_FragCoord.xy) % LPV_POINTS;
-    int face = face_index(cell, axis, grid_size) * WORDS;
+    int face = (cell_index(cell, grid_size) * 3 + axis) * WORDS;
     atomicOr(lpv_faces[face], 1u << (point.y * LPV_POINTS + point.x));
     atomicAdd(lpv_faces[face + 1], 1u);
     atomicAdd(lpv_faces[face + 2], uint((at[axis] + 0.5 - layer) * 255.0 + 0.5));
@@ -50,7 +50,7 @@ void main()
 #endif
     vec3 share = saturate(albedo / max(opacity, 1e-4)) / max(dot(abs(ng), vec3(1.0)), 1.0);
     for (int k = 0; k < 3; ++k) {
-        atomicAdd(lpv_albedo[face / WORDS * 3 + k], uint(share[k] * 255.0 + 0.5));
+        atomicAdd(lpv_albedo[face_index(cell, axis) * 3 + k], uint(share[k] * 255.0 + 0.5));
     }
 #endif
 }

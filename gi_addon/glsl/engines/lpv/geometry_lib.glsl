@@ -9,7 +9,7 @@
 #include "engines/lpv/lpv_lib.glsl"
 
 // The face below `cell` along `axis`; the first layer's are never asked for.
-int face_index(ivec3 cell, int axis, ivec3 size) { return cell_index(cell, size) * 3 + axis; }
+int face_index(ivec3 cell, int axis) { return (grid_first + cell_index(cell, grid_size)) * 3 + axis; }
 
 // Normal of a wall, turned up the axis.
 vec3 wall_normal(vec4 wall, int axis)
@@ -27,7 +27,7 @@ float open_between(vec3 at, ivec3 cell, ivec3 column, int axis, int upper)
     if (!inside_grid(column, grid_size) || upper == 0) {
         return 1.0;
     }
-    vec4 wall = lpv_walls[face_index(column, axis, grid_size)];
+    vec4 wall = lpv_walls[face_index(column, axis)];
     if (wall.x <= 0.0) {
         return 1.0;
     }

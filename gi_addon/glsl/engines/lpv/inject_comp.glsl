@@ -39,6 +39,11 @@ void main()
     if (any(lessThan(at, vec3(-1.0))) || any(greaterThan(at, vec3(grid_size) + 1.0))) {
         return; // a backdrop far outside (gi_addon/focus.py)
     }
+#if LPV_GRIDS > 1
+    if (grid_rim != 0 && !inside_grid(ivec3(floor(at + t.normal_ws * half_cell_shift(t.normal_ws))), grid_size)) {
+        return; // only the grid around has it
+    }
+#endif
     ivec3 cell = cell_in_front(at, t.normal_ws, grid_size);
     int base = cell_index(cell, grid_size) * SH_COUNT * 3;
     float y[SH_COUNT];

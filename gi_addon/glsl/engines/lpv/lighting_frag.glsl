@@ -13,7 +13,7 @@ void main()
         return;
     }
     vec4 normals = texelFetch(gbuf_normal, pixel, 0);
-    vec3 at = (position_ws_from_depth(uv, depth) - grid_origin) / grid_cell;
-    VolumeSample s = volume_in_front(at, octahedral_decode(normals.zw), view_direction_ws(uv));
-    indirect_diffuse = vec4(volume_irradiance(s, octahedral_decode(normals.xy)), 1.0);
+    vec3 light = volume_light(position_ws_from_depth(uv, depth), octahedral_decode(normals.zw), view_direction_ws(uv),
+                              octahedral_decode(normals.xy));
+    indirect_diffuse = vec4(light, 1.0);
 }

@@ -37,7 +37,7 @@ VolumeSample volume_sample(vec3 at, vec3 surface, vec3 n)
 #endif
         if (weight > 0.0) {
             for (int c = 0; c < SH_COUNT; ++c) {
-                s.sh[c] += weight * texelFetch(lpv_volume, cell + ivec3(0, 0, c * grid_size.z), 0).rgb;
+                s.sh[c] += weight * texelFetch(lpv_volume, volume_texel(cell, c), 0).rgb;
             }
             s.weight += weight;
         }
@@ -68,4 +68,25 @@ vec3 volume_irradiance(VolumeSample s, vec3 n)
         sum += s.sh[c] * (sh_cosine_share(c) * y[c]);
     }
     return max(sum, vec3(0.0));
+}
+
+// E/π on a surface at `position_ws` of geometric normal `ng` and shading normal `n`, seen from `eye`: of the finest grid around
+// it, and of the next ones as far as it is in that one's rim, or no cell of it is on the open side of the walls.
+vec3 volume_light(vec3 position_ws, vec3 ng, vec3 eye, vec3 n)
+{
+    vec3 sum = vec3(0.0);
+    float rest = 1.0;
+    for (int k = LPV_GRIDS - 1; k >= 0; --k) {
+        use_grid(k);
+        vec3 at = (position_ws - grid_origin) / grid_cell;
+        float share = k == 0 ? 1.0 : grid_share(at);
+        if (rest * share > 0.0) {
+            VolumeSample s = volume_in_front(at, ng, eye);
+            if (s.weight > 0.0) {
+                sum += rest * share * volume_irradiance(s, n);
+                rest *= 1.0 - share;
+            }
+        }
+    }
+    return sum;
 }

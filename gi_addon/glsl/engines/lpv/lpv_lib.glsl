@@ -1,7 +1,8 @@
 // The light propagation volume: its grid and its spherical harmonics.
 //
 // Cell (i, j, k) spans [i, i+1) × … in grid coordinates, which are (world − origin) / cell. A volume of spherical harmonics
-// is one 3D texture: coefficient c of cell z lies at depth z + c · grid_size.z.
+// is one 3D texture: coefficient c of cell z lies at depth z + c · grid_size.z. Grids within each other (gi_addon/nested_grids.py)
+// stand in it side by side along x, and one after the other in buffers of faces.
 
 #include "lib/math_lib.glsl"
 
@@ -29,6 +30,48 @@ float sh_cosine_share(int c) { return c == 0 ? 1.0 : c < 4 ? 2.0 / 3.0 : 0.25; }
 // How far a point must go along a unit normal to be in a cell whose centre is not behind the surface, in cells: the cell's
 // half width along the normal. Half a cell for a wall along the grid.
 float half_cell_shift(vec3 n) { return 0.5 * (abs(n.x) + abs(n.y) + abs(n.z)); }
+
+#if LPV_CHOOSES
+// The grid at hand, out of the table grid_places, grid_sizes, grid_bounds.
+vec3 grid_origin;
+float grid_cell;
+ivec3 grid_size;
+int grid_column;
+int grid_first;
+int grid_rim;
+
+void use_grid(int k)
+{
+    grid_origin = grid_places[k].xyz;
+    grid_cell = grid_places[k].w;
+    grid_size = ivec3(grid_sizes[k].xyz);
+    grid_column = int(grid_sizes[k].w);
+    grid_first = int(grid_bounds[k].x);
+    grid_rim = int(grid_bounds[k].y);
+}
+
+// How much of the light at grid point `at` is the grid's own: its rim holds what the grid around it has, whose cells are two of
+// this one's. From two of its cells inside, so that all eight cells around a point are its own, it takes over within two of theirs.
+float grid_share(vec3 at)
+{
+    float inside = 1e30;
+    for (int axis = 0; axis < 3; ++axis) {
+        inside = (grid_rim & (1 << (2 * axis))) != 0 ? min(inside, at[axis]) : inside;
+        inside = (grid_rim & (2 << (2 * axis))) != 0 ? min(inside, float(grid_size[axis]) - at[axis]) : inside;
+    }
+    return saturate((inside - 2.0) / 4.0);
+}
+#endif
+
+// Whether a cell is one that the grid around prescribes, `rim` as grid_rim.
+bool in_rim(ivec3 cell, ivec3 size, int rim)
+{
+    ivec3 sides = ivec3(equal(cell, ivec3(0))) | (ivec3(equal(cell, size - 1)) << 1);
+    return (rim & (sides.x | (sides.y << 2) | (sides.z << 4))) != 0;
+}
+
+// Where a cell's value number `layer` is: a harmonic, or an ordinate.
+ivec3 volume_texel(ivec3 cell, int layer) { return cell + ivec3(grid_column, 0, layer * grid_size.z); }
 
 bool inside_grid(ivec3 cell, ivec3 size) { return all(greaterThanEqual(cell, ivec3(0))) && all(lessThan(cell, size)); }
 

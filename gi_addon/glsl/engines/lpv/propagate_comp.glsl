@@ -54,11 +54,15 @@ void main()
     ivec3 cell = ivec3(up.x ? local.x : grid_size.x - 1 - local.x, up.y ? local.y : grid_size.y - 1 - local.y,
                        up.z ? local.z : grid_size.z - 1 - local.z);
     vec3 share = abs(w);
-    int slab = ordinate * grid_size.z;
+#if LPV_GRIDS > 1
+    if (in_rim(cell, grid_size, grid_rim)) {
+        return; // has the light of the grid around (rim_comp.glsl)
+    }
+#endif
 #if LPV_LIMITED
-    vec3 flux = imageLoad(lpv_emitted, cell + ivec3(0, 0, slab)).rgb;
+    vec3 flux = imageLoad(lpv_emitted, volume_texel(cell, ordinate)).rgb;
 #else
-    vec3 flux = imageLoad(lpv_radiance, cell + ivec3(0, 0, slab)).rgb;
+    vec3 flux = imageLoad(lpv_radiance, volume_texel(cell, ordinate)).rgb;
 #endif
     float whole = share.x + share.y + share.z;
     vec3 kept = vec3(1.0);
@@ -79,14 +83,14 @@ void main()
         if (local[axis] > 0) {
             float coverage = 0.0;
 #if HAS_LPV_WALLS
-            vec4 wall = lpv_walls[face_index(up[axis] ? cell : from, axis, grid_size)];
+            vec4 wall = lpv_walls[face_index(up[axis] ? cell : from, axis)];
             coverage = wall.x;
             if (coverage > 0.0) {
                 vec3 n = wall_normal(wall, axis) * (up[axis] ? 1.0 : -1.0);
                 behind -= share[axis] * coverage * step_share(w, n);
             }
 #endif
-            vec4 neighbour = imageLoad(lpv_radiance, from + ivec3(0, 0, slab));
+            vec4 neighbour = imageLoad(lpv_radiance, volume_texel(from, ordinate));
 #if LPV_LIMITED
             neighbour *= float(wave > 0); // before the first iteration a cell has only what it emits
 #endif
@@ -94,7 +98,7 @@ void main()
         }
 #if HAS_LPV_WALLS
         if (local[axis] < grid_size[axis] - 1) {
-            vec4 wall = lpv_walls[face_index(up[axis] ? to : cell, axis, grid_size)];
+            vec4 wall = lpv_walls[face_index(up[axis] ? to : cell, axis)];
             float coverage = wall.x;
             if (coverage > 0.0) {
                 vec3 n = wall_normal(wall, axis) * (up[axis] ? -1.0 : 1.0);
@@ -109,8 +113,8 @@ void main()
     section = section > 1e-3 * whole ? section : whole;
     float passed = open_ahead > section ? section / open_ahead : 1.0;
 #if LPV_LIMITED
-    imageStore(lpv_carried, cell + ivec3(0, 0, slab), vec4(flux / section, passed));
+    imageStore(lpv_carried, volume_texel(cell, ordinate), vec4(flux / section, passed));
 #else
-    imageStore(lpv_radiance, cell + ivec3(0, 0, slab), vec4(flux / section, passed));
+    imageStore(lpv_radiance, volume_texel(cell, ordinate), vec4(flux / section, passed));
 #endif
 }

@@ -18,7 +18,7 @@ void main()
     }
     for (int i = 0; i < 6; ++i) {
         int axis = i >> 1;
-        int face = face_index(upper, axis, grid_size);
+        int face = face_index(upper, axis);
         vec4 wall = lpv_walls[face];
         vec3 albedo = uintBitsToFloat(uvec3(lpv_albedo[face * 3], lpv_albedo[face * 3 + 1], lpv_albedo[face * 3 + 2]));
         if (wall.x <= 0.0 || upper[axis] == 0 || max3(albedo) <= 0.0) {
@@ -33,7 +33,7 @@ void main()
         vec3 irradiance = vec3(0.0);
         for (int c = 0; c < SH_COUNT; ++c) {
             // Y(−n): order 1 changes sign.
-            vec3 light = imageLoad(lpv_volume, cell + ivec3(0, 0, c * grid_size.z)).rgb;
+            vec3 light = imageLoad(lpv_volume, volume_texel(cell, c)).rgb;
             irradiance += light * (PI * sh_cosine_share(c) * (c >= 1 && c <= 3 ? -y[c] : y[c]));
         }
         vec3 flux = albedo * max(irradiance, vec3(0.0)) * (wall.x * grid_cell * grid_cell);

@@ -15,7 +15,7 @@ void main()
     int base = (cell_index(cell, grid_size) * SH_COUNT + coefficient) * 3;
     vec3 value = vec3(lpv_flux[base], lpv_flux[base + 1], lpv_flux[base + 2]) / (fixed_scale * grid_cell * grid_cell);
     if (first_group == 0) {
-        value += imageLoad(lpv_source, at).rgb;
+        value += imageLoad(lpv_source, volume_texel(at, 0)).rgb;
     }
-    imageStore(lpv_source, at, vec4(value, 0.0));
+    imageStore(lpv_source, volume_texel(at, 0), vec4(value, 0.0));
 }

@@ -15,7 +15,7 @@ const uint MIDDLE_POINT = 1u << (LPV_POINTS * LPV_POINTS / 2);
 
 uint points(ivec3 cell, int axis)
 {
-    return inside_grid(cell, grid_size) ? lpv_faces[face_index(cell, axis, grid_size) * WORDS] : 0u;
+    return inside_grid(cell, grid_size) ? lpv_faces[(cell_index(cell, grid_size) * 3 + axis) * WORDS] : 0u;
 }
 
 void main()
@@ -25,15 +25,16 @@ void main()
         return;
     }
     for (int axis = 0; axis < 3; ++axis) {
-        int face = face_index(cell, axis, grid_size);
+        int face = face_index(cell, axis);
+        int drawn = (cell_index(cell, grid_size) * 3 + axis) * WORDS;
         ivec3 along = ivec3(0);
         along[axis] = 1;
         uint here = points(cell, axis);
         bool closed = (here | points(cell - along, axis) | points(cell + along, axis)) == ALL_POINTS;
         float blocked = closed ? float((here & MIDDLE_POINT) != 0u)
                                : float(bitCount(here)) / float(LPV_POINTS * LPV_POINTS);
-        uint count = lpv_faces[face * WORDS + 1];
-        vec3 mean = vec3(lpv_faces[face * WORDS + 2], lpv_faces[face * WORDS + 3], lpv_faces[face * WORDS + 4]) /
+        uint count = lpv_faces[drawn + 1];
+        vec3 mean = vec3(lpv_faces[drawn + 2], lpv_faces[drawn + 3], lpv_faces[drawn + 4]) /
                     (255.0 * float(max(count, 1u)));
 #if HAS_LPV_ALBEDO
         for (int k = 0; k < 3; ++k) {

@@ -28,31 +28,35 @@ void main()
     uint index = view.subframe * uint(point_count) + uint(i);
     vec2 xy = sobol_2d(index, 33u) * 2.0 - 1.0;
     vec2 u = sobol_2d(index, 34u);
-    LightView v = rsm_views[min(int(u.y * float(view_count)), view_count - 1)];
+    float drawn = u.y * float(view_count * MEDIA);
+    LightView v = rsm_views[min(int(drawn) / MEDIA, view_count - 1)];
+    int k = int(drawn) % MEDIA;
     Light light = rsm_lights[v.light];
     float shown = texelFetch(rsm_depth, ivec2(v.rect.xy + (xy / v.guard * 0.5 + 0.5) * v.rect.zw), 0).r;
     vec3 origin_ws = light_view_position(v, xy, 0.0);
     vec3 along = v.perspective > 0.5 ? light_view_position(v, xy, 1.0) - origin_ws : v.axis_z;
     float scale = length(along);
     vec3 direction = along / scale;
-    vec2 span = medium_span(origin_ws, direction);
+    vec2 span = medium_span(k, origin_ws, direction);
     span = vec2(max(span.x, 0.0), min(span.y, shown > 0.0 ? shown * scale : 1e30));
     if (span.y > span.x) {
-        float sigma = max(vector_mean(medium_extinction), 1e-12);
+        float sigma = max(vector_mean(medium_extinction[k].rgb), 1e-12);
         float passed = 1.0 - exp(-sigma * (span.y - span.x));
         float rest = max(1.0 - u.x * passed, 1e-7);
         float s = span.x - log(rest) / sigma;
-        float weight = passed / (sigma * rest) * float(view_count) / float(point_count); // m
+        float weight = passed / (sigma * rest) * float(view_count * MEDIA) / float(point_count); // m
         float beam;
         vec3 flux = light_view_flux(v, light, xy, vec2(2.0), s / scale, beam);
         vpl.position_ws = origin_ws + direction * s;
         vpl.normal_ws = direction;
-        vpl.anisotropy = medium_anisotropy;
+        vpl.anisotropy = medium_scattering[k].w;
         flux *= medium_transmittance(vpl.position_ws, -direction, v.perspective > 0.5 ? s : 1e30);
-        vpl.flux = light.diffuse * flux * medium_scattering * weight;
+        vpl.flux = light.diffuse * flux * medium_scattering[k].rgb * weight;
         // The ball that a point stands for among those of all sub-frames, by its section: nearer it is no point.
         vpl.area = PI * pow(0.2387324 * beam * weight / float(view.subframes), 2.0 / 3.0); // 3/4π
     }
 #endif
+    vpl.key = 0u;
+    vpl.clear_ws = vpl.position_ws;
     vpls[vpl_count + i] = vpl;
 }

@@ -32,5 +32,10 @@ void main()
     vpl.anisotropy = 0.0;
     vpl.flux = share > 0.0 ? s.albedo * (chosen ? front : back) * (s.area * (a + b) / share) : vec3(0.0);
     vpl.area = s.area;
+    vpl.key = 0u;
+    vpl.clear_ws = vpl.position_ws;
+#if HAS_OCCUPANCY
+    vpl.clear_ws = cells_clear(vpl.position_ws, vpl.normal_ws);
+#endif
     vpls[vpl_count + i] = vpl;
 }

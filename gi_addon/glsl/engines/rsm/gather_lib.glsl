@@ -37,58 +37,152 @@ struct Gathered {
     vec4 direction;   // Σ luminance × direction to the source; Σ luminance
 };
 
+// What a virtual light sends to a surface that nothing stands before.
+struct VplLight {
+    vec3 radiance;    // E/π
+    vec3 direction;   // towards it
+    float arriving;   // luminance of E/π on a surface that faces it
+};
+
+// Its disc `widen` times as large as its own.
+VplLight vpl_light(Vpl vpl, vec3 position_ws, vec3 n, vec3 ng, float widen)
+{
+    vec3 d = vpl.position_ws - position_ws;
+    float d2 = dot(d, d);
+    float inverse = inversesqrt(max(d2, 1e-37));
+    vec3 w = d * inverse;
+    bool in_air = vpl.light == VPL_AIR;
+    float cos_p = in_air ? 1.0 : max(-dot(w, vpl.normal_ws), 0.0);
+    float cos_x = dot(w, ng) > 0.0 ? max(dot(w, n), 0.0) : 0.0;
+    cos_p = dot(w, ng) > 0.0 ? cos_p : 0.0;
+    float area = vpl.area * widen;
+    vec3 flux = vpl.flux * INV_PI;
+#if HAS_MEDIUM
+    if (in_air) {
+        // E = Φ p(θ) cosθ_x / (d² + r²): the form above, with π p in place of the sender's cosine.
+        flux *= PI * henyey_greenstein(-dot(w, vpl.normal_ws), vpl.anisotropy);
+    }
+    flux *= medium_transmittance(position_ws, w, sqrt(d2));
+#endif
+    // Φ/A · K A/(1 + K A) without the area: Φ cos cos / (π d² + cos cos A); for a direction by the same bound but for the
+    // receiver's own cosine.
+    float product = cos_p * cos_x;
+    return VplLight(flux * (product / max(PI * d2 + product * area, 1e-37)), w,
+                    luminance(flux) * cos_p / max(PI * d2 + cos_p * area, 1e-37));
+}
+
+// Whether anything stands between a virtual light and a point, `start_ws` the point clear of the cells of its own surface.
+bool vpl_hidden(Vpl vpl, vec3 start_ws, vec3 position_ws)
+{
+    bool hidden = false;
+#if HAS_OCCUPANCY && MESH_LIGHTS
+    hidden = vpl.light >= 0 && own_lamp_blocks(rsm_lights[vpl.light], vpl.position_ws, position_ws);
+#endif
+#if HAS_OCCUPANCY
+    hidden = hidden || cells_block(start_ws, vpl.clear_ws);
+#endif
+    return hidden;
+}
+
 // Every `stride`-th virtual light from `first` on, each standing for `stride` of them, its disc as many times as large. A
 // light's own disc is its share among those of all sub-frames, which a pixel's mean over them has; where the sum is not
 // averaged so, `alone` is their number, and the disc the sub-frame's.
 Gathered gather_some_vpls(vec3 position_ws, vec3 n, vec3 ng, int first, int stride, float alone)
 {
     Gathered g = Gathered(vec3(0.0), vec4(0.0));
+    vec3 start_ws = position_ws;
 #if HAS_OCCUPANCY
-    vec3 start_ws = cells_clear(position_ws, ng);
+    start_ws = cells_clear(position_ws, ng);
 #endif
     for (int i = first; i < vpl_count; i += stride) {
         Vpl vpl = vpls[i];
-        vec3 d = vpl.position_ws - position_ws;
-        float d2 = dot(d, d);
-        float inverse = inversesqrt(max(d2, 1e-37));
-        vec3 w = d * inverse;
-        bool in_air = vpl.light == VPL_AIR;
-        float cos_p = in_air ? 1.0 : -dot(w, vpl.normal_ws);
-        float cos_g = dot(w, ng);
-        if (cos_p <= 0.0 || cos_g <= 0.0) {
-            continue;
+        VplLight light = vpl_light(vpl, position_ws, n, ng, float(stride) * (vpl.light == -1 ? 1.0 : alone));
+        if (light.arriving > 0.0 && !vpl_hidden(vpl, start_ws, position_ws)) {
+            g.radiance += light.radiance;
+            g.direction += vec4(light.direction, 1.0) * light.arriving;
         }
-#if HAS_OCCUPANCY && MESH_LIGHTS
-        if (vpl.light >= 0 && own_lamp_blocks(rsm_lights[vpl.light], vpl.position_ws, position_ws)) {
-            continue;
-        }
-#endif
-#if HAS_OCCUPANCY
-        if (cells_block(start_ws, in_air ? vpl.position_ws : cells_clear(vpl.position_ws, vpl.normal_ws))) {
-            continue;
-        }
-#endif
-        float cos_x = max(dot(w, n), 0.0);
-        // Φ/A · K A/(1 + K A) without the area: Φ cos cos / (π d² + cos cos A).
-        float product = cos_p * cos_x;
-        float area = vpl.area * float(stride) * (vpl.light >= 0 || in_air ? alone : 1.0);
-        float kernel = product / (PI * d2 + product * area);
-        vec3 flux = vpl.flux;
-#if HAS_MEDIUM
-        if (in_air) {
-            // E = Φ p(θ) cosθ_x / (d² + r²): the form above, with π p in place of the sender's cosine.
-            flux *= PI * henyey_greenstein(-dot(w, vpl.normal_ws), vpl.anisotropy);
-        }
-        flux *= medium_transmittance(position_ws, w, sqrt(d2));
-#endif
-        g.radiance += flux * kernel;
-        // Light per direction, by the same bound but for the receiver's own cosine.
-        float arriving = luminance(flux) * cos_p / (PI * d2 + cos_p * area);
-        g.direction += vec4(w, 1.0) * arriving;
     }
-    g.radiance *= INV_PI * float(stride);
+    g.radiance *= float(stride);
     g.direction *= float(stride);
     return g;
 }
 
-Gathered gather_vpls(vec3 position_ws, vec3 n, vec3 ng) { return gather_some_vpls(position_ws, n, ng, 0, 1, 1.0); }
+// All of them at a point that the eye sees, `to_eye` from it.
+//
+// Rays are what costs. Of more lights than VISIBILITY_RAYS, as many are tested, drawn by what they send (systematic resampling:
+// J. Carpenter, P. Clifford and P. Fearnhead, "Improved Particle Filter for Non-linear Problems", IEE Proc. F 146, 1999): of
+// Σ f, each k-th of K equal shares, from u in [0, 1) on, falls to one light, and counts if that is seen. E[Σ] = Σ f V for a
+// uniform u, another one in each sub-frame. A light of more than a share is always tested. One u for all pixels: neighbours draw
+// the same lights, and their rays are alike.
+//
+// Σ f is known, in each colour: of share v seen, the drawn lights S of all drawn P, the sum is S + v (Σ f − P) (regression; W. G.
+// Cochran, "Sampling Techniques", §7). That is S in luminance, by which they were drawn, and has no noise in any colour where all
+// is seen or nothing; what it shifts colours by in half shadow is v's covariance with P, of order 1/K.
+Gathered gather_vpls(vec3 position_ws, vec3 n, vec3 ng, vec3 to_eye)
+{
+    Gathered g = Gathered(vec3(0.0), vec4(0.0));
+    vec3 start_ws = position_ws;
+#if HAS_OCCUPANCY
+    start_ws = cells_clear_along(position_ws, ng, to_eye);
+#endif
+#if HAS_OCCUPANCY && VISIBILITY_RAYS > 0
+    float u = sobol_2d(view.subframe, 36u).x;
+    float total = 0.0;
+    Gathered open = g;   // Σ f − P
+    for (int i = 0; i < vpl_count; ++i) {
+        VplLight light = vpl_light(vpls[i], position_ws, n, ng, 1.0);
+        total += light.arriving;
+        open.radiance += light.radiance;
+        open.direction += vec4(light.direction, 1.0) * light.arriving;
+    }
+    if (total <= 0.0) {
+        return g;
+    }
+    int picked[VISIBILITY_RAYS];
+    float shares[VISIBILITY_RAYS];
+    int count = 0;
+    float share = total / float(VISIBILITY_RAYS);
+    float below = 0.0;
+    float taken = 0.0; // shares that fell to the lights so far
+    for (int i = 0; i < vpl_count; ++i) {
+        below += vpl_light(vpls[i], position_ws, n, ng, 1.0).arriving;
+        float reached = min(floor(below / share + u), float(VISIBILITY_RAYS));
+        if (reached > taken && count < VISIBILITY_RAYS) {
+            picked[count] = i;
+            shares[count] = reached - taken;
+            ++count;
+            taken = reached;
+        }
+    }
+    float seen = 0.0;
+    for (int k = 0; k < VISIBILITY_RAYS; ++k) {
+        if (k < count) {
+            Vpl vpl = vpls[picked[k]];
+            VplLight light = vpl_light(vpl, position_ws, n, ng, 1.0);
+            float stands_for = shares[k] * share / light.arriving;
+            vec3 radiance = light.radiance * stands_for;
+            vec4 direction = vec4(light.direction, 1.0) * (light.arriving * stands_for);
+            open.radiance -= radiance;
+            open.direction -= direction;
+            if (!vpl_hidden(vpl, start_ws, position_ws)) {
+                g.radiance += radiance;
+                g.direction += direction;
+                seen += shares[k];
+            }
+        }
+    }
+    seen /= float(VISIBILITY_RAYS);
+    g.radiance += seen * open.radiance;
+    g.direction += seen * open.direction;
+#else
+    for (int i = 0; i < vpl_count; ++i) {
+        Vpl vpl = vpls[i];
+        VplLight light = vpl_light(vpl, position_ws, n, ng, 1.0);
+        if (light.arriving > 0.0 && !vpl_hidden(vpl, start_ws, position_ws)) {
+            g.radiance += light.radiance;
+            g.direction += vec4(light.direction, 1.0) * light.arriving;
+        }
+    }
+#endif
+    return g;
+}

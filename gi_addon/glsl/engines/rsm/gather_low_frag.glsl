@@ -12,7 +12,8 @@ void main()
     low_indirect = vec4(0.0);
     low_direction = vec4(0.0);
     if (r.exists) {
-        Gathered g = gather_vpls(r.position_ws, r.n, r.ng);
+        Gathered g = gather_vpls(r.position_ws, r.n, r.ng,
+                                 view_direction_ws((vec2(r.pixel) + 0.5) * view.inverse_resolution));
         low_indirect = vec4(g.radiance, 1.0);
         low_direction = g.direction;
     }

@@ -27,7 +27,7 @@ void main()
     found = interpolated_indirect(position_ws, n, ng, depth, radiance);
 #endif
     if (!found) {
-        radiance = gather_vpls(position_ws, n, ng).radiance;
+        radiance = gather_vpls(position_ws, n, ng, view_direction_ws(uv)).radiance;
     }
 #if HAS_AO
     radiance *= texelFetch(ao, pixel, 0).g; // nearer than visibility is tested, or everywhere if it is not

@@ -29,6 +29,10 @@ const int RAY_POINTS = 8;
 const int RAY_HALVINGS = 4;
 // Virtual lights that light a point which the picture does not show: an even share of them, another one for every ray.
 const int RAY_VPLS = 4;
+// Points between a ray's start and where it is clear of its own surface's cells, at which the picture is asked for contacts.
+// Rays that graze their surface are asked for so many cells at most.
+const int CONTACT_POINTS = 6;
+const float CONTACT_CELLS = 6.0;
 const float NO_SURFACE = 1e30;
 // A surface that faces as the ray's own does (within 45°) and is not half a cell above it is that one: half of what its
 // place is known to.
@@ -87,9 +91,36 @@ bool screen_radiance(vec3 position_ws, vec3 direction, out vec3 radiance)
 }
 #endif
 
+// Whether the ray meets a surface that the picture shows within `reach` (m): it passes through the plane of a pixel that it is
+// seen at, from before it to less than a cell behind.
+bool meets_on_screen(vec3 origin_ws, vec3 direction, float reach, out float distance)
+{
+    bool met = false;
+    distance = NO_SURFACE;
+    for (int k = 1; k <= CONTACT_POINTS; ++k) {
+        vec3 p = origin_ws + direction * (reach * float(k) / float(CONTACT_POINTS));
+        vec3 s = project_ws(p);
+        ivec2 pixel = ivec2(s.xy * view.resolution);
+        if (met || s.z <= view.clip_start || any(lessThan(s.xy, vec2(0.0))) || any(greaterThanEqual(s.xy, vec2(1.0)))) {
+            continue;
+        }
+        float depth = texelFetch(gbuf_depth, pixel, 0).r;
+        vec3 shown = position_ws_from_depth((vec2(pixel) + 0.5) * view.inverse_resolution, depth);
+        vec3 n = octahedral_decode(texelFetch(gbuf_normal, pixel, 0).zw);
+        float before = dot(origin_ws - shown, n);
+        float behind = dot(shown - p, n);
+        if (depth > 0.0 && before > 0.0 && behind >= 0.0 && behind < cell_size && abs(depth - s.z) < cell_size) {
+            met = true;
+            distance = before / max(-dot(direction, n), 1e-6);
+        }
+    }
+    return met;
+}
+
 // Radiance along the ray, W/(m²·sr), with a unit `direction`, from a surface of geometric normal `ng` on the ray's side;
 // `hit` whether anything is there. Cells before the ray is clear of its own surface's may be that surface's: of them only
-// what a light's map confirms counts. `u` in [0, 1) chooses among virtual lights.
+// what the picture shows or a light's map confirms counts: a surface whose lit side the ray enters, or that it would leave by that
+// side, coming from its dark one (from a room through its wall into the sun). `u` in [0, 1) chooses among virtual lights.
 vec3 rsm_ray(vec3 origin_ws, vec3 direction, vec3 ng, float u, out bool hit, out float distance)
 {
     float clear = dot(abs(ng), vec3(1.0)) / max(dot(direction, ng), 1e-3);
@@ -103,6 +134,13 @@ vec3 rsm_ray(vec3 origin_ws, vec3 direction, vec3 ng, float u, out bool hit, out
     vec3 normal_ws = vec3(0.0);
     hit = false;
     distance = NO_SURFACE;
+#if HAS_GBUF_DIFFUSE
+    vec3 seen;
+    if (meets_on_screen(origin_ws, direction, min(clear + 1.0, CONTACT_CELLS) * cell_size, distance)) {
+        hit = true;
+        return screen_radiance(origin_ws + direction * distance, direction, seen) ? seen : vec3(0.0);
+    }
+#endif
     for (int r = 0; r < RAY_RUNS; ++r) {
         vec2 run;
         if (hit || !cells_next_run(start, d, far, t, free_before, run)) {
@@ -112,6 +150,9 @@ vec3 rsm_ray(vec3 origin_ws, vec3 direction, vec3 ng, float u, out bool hit, out
         float low = max(run.x - 1.0, 0.0) * cell_size;
         float step_ = (min(run.y + 1.0, far) * cell_size - low) / float(RAY_POINTS);
         bool lit_through = false;
+        float stop = NO_SURFACE; // the first surface that is met from its dark side
+        vec3 stop_albedo = vec3(-1.0);
+        vec3 stop_normal = vec3(0.0);
         for (int i = 0; i < rsm_light_count; ++i) {
             Light light = rsm_lights[i];
             if (light.views <= 0) {
@@ -120,6 +161,9 @@ vec3 rsm_ray(vec3 origin_ws, vec3 direction, vec3 ng, float u, out bool hit, out
             bool before = false;
             bool all_lit = true;
             bool found = false;
+            bool under = false;
+            bool leaves = false;
+            float leaves_at = low;
             float a = low;
             float b = low;
             for (int k = 0; k <= RAY_POINTS; ++k) {
@@ -135,9 +179,39 @@ vec3 rsm_ray(vec3 origin_ws, vec3 direction, vec3 ng, float u, out bool hit, out
                     b = at;
                     a = found ? at - step_ : a;
                     before = known && gap > 0.0;
+                    if (!leaves && under && before) {
+                        leaves = true;
+                        leaves_at = at;
+                    }
+                    under = known && gap <= 0.0;
                 }
             }
             lit_through = lit_through || all_lit;
+            if (leaves) {
+                int index = 0;
+                ivec2 texel = ivec2(0);
+                float under_at = leaves_at - step_;
+                float behind = NO_SURFACE;
+                for (int k = 0; k < RAY_HALVINGS; ++k) {
+                    bool known;
+                    float middle = 0.5 * (under_at + leaves_at);
+                    float gap = rsm_gap(light, origin_ws + direction * middle, known, index, texel);
+                    behind = gap <= 0.0 ? -gap : behind;
+                    under_at = gap <= 0.0 ? middle : under_at;
+                    leaves_at = gap <= 0.0 ? leaves_at : middle;
+                }
+                bool known;
+                float gap = rsm_gap(light, origin_ws + direction * leaves_at, known, index, texel);
+                // At a shadow's edge in the air the map's depth jumps.
+                known = known && gap < cell_size && (behind < cell_size || behind == NO_SURFACE);
+                RsmTexel s = rsm_texel(index, texel);
+                bool own = abs(dot(s.normal_ws, ng)) > OWN_FACING && leaves_at * dot(direction, ng) < OWN_HEIGHT * cell_size;
+                if (known && s.area > 0.0 && dot(s.normal_ws, direction) > 0.0 && !own && leaves_at < stop) {
+                    stop = leaves_at;
+                    stop_albedo = texelFetch(rsm_albedo, texel, 0).rgb;
+                    stop_normal = -s.normal_ws;
+                }
+            }
             if (!found) {
                 continue;
             }
@@ -165,6 +239,13 @@ vec3 rsm_ray(vec3 origin_ws, vec3 direction, vec3 ng, float u, out bool hit, out
                 hit = true;
             }
         }
+        if (stop < distance - OWN_HEIGHT * cell_size) {
+            hit = true;
+            radiance = vec3(0.0);
+            distance = stop;
+            albedo = stop_albedo;
+            normal_ws = stop_normal;
+        }
         // Seen by no light, and not seen past by any: an unlit surface ends the ray.
         if (!hit && !lit_through && run.x > clear) {
             hit = true;
@@ -172,7 +253,6 @@ vec3 rsm_ray(vec3 origin_ws, vec3 direction, vec3 ng, float u, out bool hit, out
         }
     }
 #if HAS_GBUF_DIFFUSE
-    vec3 seen;
     if (hit && screen_radiance(origin_ws + direction * distance, direction, seen)) {
         return seen;
     }

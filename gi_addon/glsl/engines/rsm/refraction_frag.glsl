@@ -21,8 +21,8 @@ void main()
 #if HAS_VPLS
         vec4 normals = texelFetch(translucent_normal, pixel, 0);
         vec2 uv = gl_FragCoord.xy * view.inverse_resolution;
-        vec3 far = gather_vpls(position_ws_from_depth(uv, depth), -octahedral_decode(normals.xy),
-                               -octahedral_decode(normals.zw)).radiance;
+        vec3 far = gather_some_vpls(position_ws_from_depth(uv, depth), -octahedral_decode(normals.xy),
+                                    -octahedral_decode(normals.zw), 0, 1, 1.0).radiance;
         transmission_indirect = vec4(far * texelFetch(translucent_color, pixel, 0).rgb, 1.0);
 #endif
         return;

@@ -36,10 +36,10 @@ void main()
         vec2 along = screen_direction(c, t);
         for (int turned = 0; turned < 2; ++turned) {
             vec2 side = along * (1.0 - 2.0 * float(turned));
-            Scan scan = begin_scan(origin, v, t, side * min(pixels_to_edge(origin.xy, side), radius), ao_steps,
+            Scan scan = begin_scan(ssdo_planes, origin, v, t, side * min(pixels_to_edge(origin.xy, side), radius), ao_steps,
                                    fract(jitters.x + 7.0 * turn + 0.618034 * float(2 * i + turned)), ao_thickness);
             for (int k = 0; k <= ao_steps; ++k) {
-                Covered r = scan_next(scan, slice, k);
+                Covered r = scan_next(ssdo_planes, scan, slice, k, vec4(NOTHING));
                 mask |= r.distance > 0.0 && r.distance <= ao_distance ? r.sectors : 0u;
             }
         }

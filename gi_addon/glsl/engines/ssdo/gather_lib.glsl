@@ -23,6 +23,18 @@ vec3 sent_from(ivec2 pixel)
 #endif
 }
 
+// Whether light is wanted at a pixel: what is drawn beyond the picture (by more than `beyond` pixels) only sends.
+bool receives(ivec2 pixel, int beyond)
+{
+#if MARGIN_RECEIVES
+    return true;
+#else
+    ivec2 low = ivec2(view.margin - beyond);
+    ivec2 high = ivec2(view.resolution) - low;
+    return all(greaterThanEqual(pixel, low)) && all(lessThan(pixel, high));
+#endif
+}
+
 struct Gathered {
     vec3 radiance;    // E/π, W/(m²·sr)
     vec4 direction;   // Σ luminance × direction; Σ luminance
@@ -37,6 +49,31 @@ void add_light(inout Gathered g, vec3 light, vec3 direction, float cos_n)
     g.radiance += light;
     g.direction += vec4(direction, 1.0) * (luminance(light) * PI / max(cos_n, LEAST_COS));
 }
+
+// A sample's light, in the sectors in which it is the first to be seen; what it fills is added to `filled`, for after the samples
+// of all layers at this place: a thing is filled from its front to its back, which must not hide the back.
+void take(inout Gathered g, inout uint mask, inout uint filled, Covered r, float reach, bool sends, vec3 sent, Slice slice, vec3 n,
+          vec3 v, vec3 t)
+{
+    if (r.distance > reach) {
+        return;
+    }
+    filled |= r.sectors;
+    uint lit = r.lit & ~mask;
+    if (lit != 0u && sends) {
+        mask |= lit;
+        vec3 direction = v * r.direction.x + t * r.direction.y;
+        add_light(g, sent * (float(bitCount(lit)) / SECTORS * slice.weight), direction, dot(direction, n));
+    }
+}
+
+const vec4 NOT_KNOWN = vec4(NOTHING, 0.0, 0.0, 0.0);
+#if LAYERS > 1
+// The plane in which a thing ends that begins at a surface: the next layer's, if that shows a back there; else it is a sheet.
+vec4 thing_ends(vec4 here, vec4 next) { return here.w > 0.0 && next.w < 0.0 ? next : here; }
+// The same for the last layer: a back ends what it belongs to, of a front it is not known.
+vec4 last_thing_ends(vec4 here) { return here.w < 0.0 ? here : NOT_KNOWN; }
+#endif
 
 Gathered gather_screen(vec3 position_ws, vec3 n, vec3 ng, vec3 v, ivec2 place)
 {
@@ -57,20 +94,49 @@ Gathered gather_screen(vec3 position_ws, vec3 n, vec3 ng, vec3 v, ivec2 place)
         vec2 along = screen_direction(c, t);
         for (int turned = 0; turned < 2; ++turned) {
             vec2 side = along * (1.0 - 2.0 * float(turned));
-            Scan scan = begin_scan(origin, v, t, side * pixels_to_edge(origin.xy, side), ssdo_steps,
-                                   fract(u.x + 0.5 * float(turned)), ssdo_thickness);
+            vec2 way = side * pixels_to_edge(origin.xy, side);
+            float jitter = fract(u.x + 0.5 * float(turned));
+            Scan scan = begin_scan(ssdo_planes, origin, v, t, way, ssdo_steps, jitter, ssdo_thickness);
+#if LAYERS > 1
+            Scan scan_2 = begin_scan(ssdo_planes_2, origin, v, t, way, ssdo_steps, jitter, ssdo_thickness);
+#endif
+#if LAYERS > 2
+            Scan scan_3 = begin_scan(ssdo_planes_3, origin, v, t, way, ssdo_steps, jitter, ssdo_thickness);
+#endif
             for (int k = 0; k <= ssdo_steps; ++k) {
-                Covered r = scan_next(scan, slice, k);
-                uint seen = r.sectors & ~mask;
-                if (seen != 0u && r.distance <= reach) {
-                    uint lit = r.lit & ~mask;
-                    mask |= seen;
-                    if (lit != 0u && faces(r.at.plane, r.at.pixel, origin)) {
-                        vec3 direction = v * r.direction.x + t * r.direction.y;
-                        float share = float(bitCount(lit)) / SECTORS * slice.weight;
-                        add_light(g, sent_from(r.at.pixel) * share, direction, dot(direction, n));
-                    }
+                ivec2 at = scan.last.pixel;
+                vec4 plane = scan.last.plane;
+                uint filled = 0u;
+#if LAYERS > 1
+                vec4 behind = texelFetch(ssdo_planes_2, at, 0);
+                vec4 end = thing_ends(plane, behind);
+#else
+                vec4 end = NOT_KNOWN;
+#endif
+                Covered r = scan_next(ssdo_planes, scan, slice, k, end);
+                if (r.sectors != 0u) {
+                    take(g, mask, filled, r, reach, faces(plane, at, origin), sent_from(at), slice, n, v, t);
                 }
+#if LAYERS > 1
+                plane = behind;
+#if LAYERS > 2
+                behind = texelFetch(ssdo_planes_3, at, 0);
+                end = thing_ends(plane, behind);
+#else
+                end = last_thing_ends(plane);
+#endif
+                r = scan_next(ssdo_planes_2, scan_2, slice, k, end);
+                if (r.sectors != 0u) {
+                    take(g, mask, filled, r, reach, faces(plane, at, origin), texelFetch(ssdo_sent_2, at, 0).rgb, slice, n, v, t);
+                }
+#endif
+#if LAYERS > 2
+                r = scan_next(ssdo_planes_3, scan_3, slice, k, last_thing_ends(behind));
+                if (r.sectors != 0u) {
+                    take(g, mask, filled, r, reach, faces(behind, at, origin), texelFetch(ssdo_sent_3, at, 0).rgb, slice, n, v, t);
+                }
+#endif
+                mask |= filled;
             }
         }
 #if GATHER_WORLD

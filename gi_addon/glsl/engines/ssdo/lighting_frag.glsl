@@ -22,7 +22,7 @@ void main()
     ivec2 pixel = ivec2(gl_FragCoord.xy);
     vec2 uv = gl_FragCoord.xy * view.inverse_resolution;
     float depth = texelFetch(gbuf_depth, pixel, 0).r;
-    if (depth <= 0.0) {
+    if (depth <= 0.0 || !receives(pixel, 0)) {
         set_light(vec3(0.0));
         return;
     }

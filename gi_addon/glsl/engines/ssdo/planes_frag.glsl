@@ -6,18 +6,21 @@
 // From n·(o + d/q − p) = 0 along the ray o + d z: q = n·d / n·(p − o), or z = n·(p − o)/n·d with d constant.
 
 #include "engines/ssdo/screen_lib.glsl"
+#include "engines/ssdo/layer_lib.glsl"
 
 void main()
 {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
     vec2 uv = gl_FragCoord.xy * view.inverse_resolution;
     float depth = texelFetch(gbuf_depth, pixel, 0).r;
-    ssdo_planes = vec4(NOTHING, 0.0, 0.0, 0.0);
+    PLANES = vec4(NOTHING, 0.0, 0.0, 0.0);
     if (depth <= 0.0) {
         return;
     }
     vec3 ng = octahedral_decode(texelFetch(gbuf_normal, pixel, 0).zw);
     vec3 d = ray_direction_ws(uv);
+    float side = dot(ng, d) <= 0.0 ? 1.0 : -1.0;
+    ng *= side;
     float q = nearness(depth);
     vec2 slope;
     if (view.orthographic > 0.5) {
@@ -32,5 +35,5 @@ void main()
     float steepest = view.orthographic > 0.5 ? depth : q;
     float steep = max(abs(slope.x), abs(slope.y));
     slope *= min(1.0, steepest / max(steep, 1e-30));
-    ssdo_planes = vec4(q, slope, 0.0);
+    PLANES = vec4(q, slope, side);
 }

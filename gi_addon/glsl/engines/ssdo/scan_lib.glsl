@@ -1,4 +1,5 @@
-// The screen's samples of a slice (slice_lib.glsl), one side of it at a time. Included where `ssdo_planes` is declared.
+// The screen's samples of a slice (slice_lib.glsl), one side of it at a time. Included where `ssdo_planes` and `ssdo_box`
+// are declared.
 //
 // A sample stands for its surface as far as that goes: to where it meets the plane of the next sample, if that is between the
 // two, and half-way else; and for as much behind it as it is taken to be thick. The paper leaves the gaps between samples
@@ -12,11 +13,11 @@
 #include "engines/ssdo/screen_lib.glsl"
 #include "engines/ssdo/slice_lib.glsl"
 
-// Pixels from `from` to the picture's edge along a unit direction.
+// Pixels from `from`, along a unit direction, to the edge of what is drawn, or of the scene on it: no step is spent on nothing.
 float pixels_to_edge(vec2 from, vec2 along)
 {
-    vec2 room = mix(from, view.resolution - from, greaterThan(along, vec2(0.0)));
-    vec2 d = room / max(abs(along), vec2(1e-6));
+    vec2 room = mix(from - ssdo_box.xy, ssdo_box.zw - from, greaterThan(along, vec2(0.0)));
+    vec2 d = max(room, 0.0) / max(abs(along), vec2(1e-6));
     return 0.999 * min(d.x, d.y);
 }
 
@@ -47,7 +48,7 @@ struct Scan {
     float since;      // share of the way from where `last` stands
 };
 
-Scan begin_scan(vec3 origin, vec3 v, vec3 t, vec2 way, int steps, float jitter, float thickness)
+Scan begin_scan(sampler2D planes, vec3 origin, vec3 v, vec3 t, vec2 way, int steps, float jitter, float thickness)
 {
     Scan scan;
     bool perspective = view.orthographic < 0.5;
@@ -63,7 +64,7 @@ Scan begin_scan(vec3 origin, vec3 v, vec3 t, vec2 way, int steps, float jitter, 
     scan.pixel = inversesqrt(max(dot(way, way), 1.0));
     scan.thickness = thickness;
     scan.last.pixel = ivec2(origin.xy);
-    scan.last.plane = texelFetch(ssdo_planes, scan.last.pixel, 0);
+    scan.last.plane = texelFetch(planes, scan.last.pixel, 0);
     scan.last.s = 0.0;
     scan.since = 0.0;
     return scan;
@@ -89,8 +90,9 @@ struct Covered {
 };
 
 // What the pixel before the k-th sample's covers, which is known when that is another: k from 0 to `steps`, where the way ends.
-// All samples of one pixel are one. The receiver's own pixel covers nothing.
-Covered scan_next(inout Scan scan, Slice slice, int k)
+// All samples of one pixel are one. The receiver's own pixel covers nothing. `end` is the plane where the thing ends that the sample
+// shows; NOTHING where that is not known, and guessed.
+Covered scan_next(sampler2D planes, inout Scan scan, Slice slice, int k, vec4 end)
 {
     ScreenSample a = scan.last;
     ScreenSample b = a;
@@ -103,7 +105,7 @@ Covered scan_next(inout Scan scan, Slice slice, int k)
             scan.last = b;
             return r;
         }
-        b.plane = texelFetch(ssdo_planes, b.pixel, 0);
+        b.plane = texelFetch(planes, b.pixel, 0);
         // A pixel is known at its middle: the edge may be before the sample of `a`, or a pixel behind that of `b`.
         float latest = b.s + scan.pixel;
         vec2 p = scan.origin.xy + scan.way * scan.since;
@@ -126,7 +128,11 @@ Covered scan_next(inout Scan scan, Slice slice, int k)
         int before = scan.since > 0.0 ? sectors_below(slice, unit(slice_toward(scan, a, scan.since)))
                                       : scan.across.y > 0.0 ? int(SECTORS) : 0;
         int after = sectors_below(slice, unit(slice_toward(scan, a, until)));
-        int behind = sectors_below(slice, unit(d - vec2(scan.thickness * far, 0.0)));
+        vec2 past = d - vec2(scan.thickness * far, 0.0);
+        if (end.x > 0.5 * NOTHING) {
+            past = slice_toward(scan, ScreenSample(a.pixel, end, a.s), a.s);
+        }
+        int behind = sectors_below(slice, unit(past));
         r.lit = bits_below(max(before, after)) & ~bits_below(min(before, after));
         r.sectors = r.lit | bits_below(max(after, behind)) & ~bits_below(min(after, behind));
     }

@@ -44,8 +44,8 @@ float spacing(float k, int steps, float jitter) { return sqr((k + jitter) / (flo
 float nearness_of_pixel(vec3 at) { return view.pixel_size * (view.orthographic > 0.5 ? 1.0 : at.z); }
 float nearness_rounding(vec3 at) { return 1e-6 * (view.orthographic > 0.5 ? view.scene_radius : at.z); }
 
-// Whether the surface of `pixel` shows its front to a point at screen position `at`: the point is in front of its plane, by more
-// than rounding, which would make planes light themselves. Normals are kept to 2⁻¹⁵, which tilts a plane of slope tan φ by
+// Whether the surface of `pixel` shows its front (plane.w: 1 if that is the eye's side, −1 if not, 0 where nothing is) to a point
+// at screen position `at`: the point is before its plane, by more than rounding, which would make planes light themselves. Normals are kept to 2⁻¹⁵, which tilts a plane of slope tan φ by
 // (1 + tan² φ) of that per pixel of distance.
 bool faces(vec4 plane, ivec2 pixel, vec3 at)
 {
@@ -53,7 +53,7 @@ bool faces(vec4 plane, ivec2 pixel, vec3 at)
     float width = nearness_of_pixel(at);
     vec2 slope = plane.yz / width;
     float rounding = nearness_rounding(at) + width * (1.0 + dot(slope, slope)) * length(away) / 32768.0;
-    return at.z > plane.x + dot(plane.yz, away) + rounding;
+    return plane.w * (at.z - plane.x - dot(plane.yz, away)) > rounding;
 }
 
 // The surface of `pixel` continued to pixel position `p`, q there. A plane that is looked along would run to the eye or the

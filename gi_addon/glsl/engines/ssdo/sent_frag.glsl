@@ -3,6 +3,7 @@
 
 #include "lib/view_lib.glsl"
 #include "lib/bsdf_lib.glsl"
+#include "engines/ssdo/layer_lib.glsl"
 
 void main()
 {
@@ -21,5 +22,5 @@ void main()
         albedo += lobe_albedo_average(brdf_average, brdf_energy, lobe);
     }
 #endif
-    ssdo_sent = vec4(arriving * albedo, 1.0);
+    SENT_LIGHT = vec4(arriving * albedo, 1.0);
 }

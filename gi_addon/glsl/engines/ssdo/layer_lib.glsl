@@ -1,0 +1,21 @@
+// The layers of depth that the screen is known in: what the camera sees, and what lies behind that, LAYER 2 and on. Names of a
+// layer's textures, and what a pass that draws one needs of the layer in front of it.
+//
+// C. Everitt, "Interactive Order-Independent Transparency", NVIDIA 2001: the nearest of what is farther than the layer before.
+
+#if LAYER == 2
+#define PLANES ssdo_planes_2
+#define PLANES_BEFORE ssdo_planes
+#define SENT_LIGHT ssdo_sent_2
+#elif LAYER == 3
+#define PLANES ssdo_planes_3
+#define PLANES_BEFORE ssdo_planes_2
+#define SENT_LIGHT ssdo_sent_3
+#elif LAYER == 4
+#define PLANES ssdo_planes_4
+#define PLANES_BEFORE ssdo_planes_3
+#define SENT_LIGHT ssdo_sent_4
+#else
+#define PLANES ssdo_planes
+#define SENT_LIGHT ssdo_sent
+#endif
