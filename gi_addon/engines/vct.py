@@ -87,7 +87,8 @@ class RadianceInjection(Pass):
     title = "Voxel Radiance Injection"
     figure = "Voxel Radiance Injection, Voxel Anisotropic Mipmap Generation"
     reads = (
-        "voxels.sheets", "voxels.kinds", "voxels.albedo", Optional("voxels.extents", ("vct.bounce",)), Optional("voxels.emission"), Optional("voxels.lamps"),
+        "voxels.sheets", "voxels.kinds", "voxels.albedo", Optional("voxels.extents", ("vct.bounce",)),
+        Optional("voxels.emission"), Optional("voxels.lamps"),
         Optional("rsm.depth"), Optional("rsm.albedo"), Optional("rsm.normal"), Optional("rsm.lights"), Optional("rsm.views"),
     )  # fmt: skip
     writes = (

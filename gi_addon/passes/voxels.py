@@ -109,8 +109,8 @@ class Voxelisation(Pass):
     writes = (
         Texture("voxels.sheets", "voxel_sheets", "by side and axis: ½ + ½ slopes and ½ + ⅓ height of the sheet over the cell's "
                 "middle, in cells; a bit for each square that it covers, over 65535", "rgba16", voxel_atlas),
-        Texture("voxels.extents", "voxel_extents", "by side and axis: how far the sheet reaches over the cell's face, down u and v "
-                "from its far sides, and up from its near ones", "rgba8", voxel_atlas),
+        Texture("voxels.extents", "voxel_extents", "by side and axis: how far the sheet reaches over the cell's face, "
+                "down u and v from its far sides, and up from its near ones", "rgba8", voxel_atlas),
         Texture("voxels.kinds", "voxel_kinds", "a bit for each kind of sheet in the cell or, in an empty one, 64 + level of the "
                 "largest empty block around it, over 255; mean opacity", "rg8", _size,
                 mips=lambda f: voxel_grid(f).levels, scratch=True),
