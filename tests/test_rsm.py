@@ -123,6 +123,21 @@ def test_two_lights_are_the_sum_of_each(gl):
     assert np.abs(both["Diffuse Indirect"] - indirect).max() <= 1e-4 * indirect.max()
 
 
+def test_rays_drawn_by_what_lights_send_keep_the_mean(gl):
+    """16 of 200 lights tested in each of 16 sub-frames, against all: what is left is noise, and none where all is in sight. The
+    share seen has a variance of 1/(4 · 16 · 16) at most for independent draws: 3 % of what would arrive."""
+    pictures = {}
+    for blocks in (True, False):
+        tested, drawn = (
+            make(scenes.cornell(blocks=blocks), "Diffuse Indirect", samples=16, rsm__visibility_rays=rays)
+            .passes["Diffuse Indirect"].astype("f8") for rays in (0, 256)
+        )  # fmt: skip
+        pictures[blocks] = np.abs(drawn - tested).mean() / tested.mean()
+        assert drawn.mean() == pytest.approx(tested.mean(), rel=0.01)
+    assert pictures[True] < 0.03
+    assert pictures[False] < 0.01
+
+
 def test_the_same_input_gives_the_same_picture_bit_for_bit(gl):
     """Stability test 16."""
     scene = scenes.cornell(light="area")

@@ -174,7 +174,8 @@ class RSMSamplingPattern(Pass):
     figure = "RSM Sampling Pattern"
     reads = ("rsm.flux", "rsm.depth", "rsm.albedo", "rsm.normal", "rsm.lights", "rsm.views")
     writes = (
-        Buffer("vpls.drawn", "drawn_vpls", "those of the first bounce, as they were drawn", "Vpl", VPL, first_count, scratch=True),
+        Buffer("vpls.drawn", "drawn_vpls", "those of the first bounce, as they were drawn", "Vpl", VPL, first_count,
+               scratch=True),
         Buffer("vpls", "vpls", "virtual point lights of this sub-frame", "Vpl", VPL,
                vpl_count),
     )  # fmt: skip

@@ -201,8 +201,9 @@ class ConeHits(Pass):
     figure = "Voxel Interpolated Indirect Lighting Computation"
     reads = (*_VOLUMES, *_BLOCKS)
     writes = (
-        Texture("vct.hits", "cone_hits", "halves: offset to what a cone of the block met first, cells; radiance that it brings, "
-                "W/(m²·sr)", "rgba32ui", lambda f: (*gather_size(f), f.settings.vct.cones), layers=True, scratch=True),
+        Texture("vct.hits", "cone_hits", "packed (hits_lib.glsl): offset to what a cone of the block met first, cells; its "
+                "normal; radiance that it brings, W/(m²·sr)", "rgba32ui", lambda f: (*gather_size(f), f.settings.vct.cones),
+                layers=True, scratch=True),
     )  # fmt: skip
     uniforms = _CONE_UNIFORMS
     shaders = {"main": {"compute": "engines/vct/gather_low_comp.glsl"}}

@@ -6,16 +6,29 @@ struct Hit {
     vec3 radiance;  // 0 from there
 };
 
+// Radiance of any strength and sign: 12 bits of each colour's magnitude and its sign, an exponent of 8 bits for all three. Halves
+// would end at 65504 and be zero in dim scenes.
+const float MANTISSA = 4096.0;
+const int EXPONENT_BIAS = 127;
+
 uvec4 pack_hit(Hit hit)
 {
-    return uvec4(packHalf2x16(hit.offset.xy), packHalf2x16(vec2(hit.offset.z, hit.radiance.x)), packHalf2x16(hit.radiance.yz),
+    float most = max3(abs(hit.radiance));
+    int exponent = most > 0.0 ? clamp(int(floor(log2(most))) + 1, -126, 126) : -EXPONENT_BIAS;
+    uvec3 m = uvec3(min(round(abs(hit.radiance) * exp2(float(-exponent)) * MANTISSA), MANTISSA - 1.0));
+    m |= uvec3(lessThan(hit.radiance, vec3(0.0))) << 12u;
+    uint high = m.b >> 6u | uint(exponent + EXPONENT_BIAS) << 7u;
+    return uvec4(packHalf2x16(hit.offset.xy), packHalf2x16(vec2(hit.offset.z, 0.0)) | high << 16u, m.r | m.g << 13u | m.b << 26u,
                  packUnorm2x16(octahedral_encode(hit.normal)));
 }
 
 Hit unpack_hit(uvec4 texel)
 {
-    vec2 zr = unpackHalf2x16(texel.y);
-    return Hit(vec3(unpackHalf2x16(texel.x), zr.x), octahedral_decode(unpackUnorm2x16(texel.w)), vec3(zr.y, unpackHalf2x16(texel.z)));
+    uint high = texel.y >> 16u;
+    uvec3 m = uvec3(texel.z, texel.z >> 13u, texel.z >> 26u | high << 6u) & 8191u;
+    vec3 radiance = vec3(m & 4095u) / MANTISSA * exp2(float(int(high >> 7u) - EXPONENT_BIAS));
+    return Hit(vec3(unpackHalf2x16(texel.x), unpackHalf2x16(texel.y).x), octahedral_decode(unpackUnorm2x16(texel.w)),
+               mix(radiance, -radiance, greaterThan(m, uvec3(4095u))));
 }
 
 // A point that gathers.

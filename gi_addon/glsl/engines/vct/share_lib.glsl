@@ -1,11 +1,11 @@
 // What a point takes of the cones of the blocks around it. Included after passes/gather_receiver.glsl and diffuse_lib.glsl, where
 // `cone_hits` is declared.
 //
-// Neighbours' cones end on surfaces that this point sees too, in another direction and at another distance. A
-// cone of block i ends at y with density g_i/π per area, g_i = cosθ_i cosθ_y/r_i²; what y sends here is L g_c/π per area. So its
-// light counts here by g_c/g_i: neighbours add no blur, but for what one point sees and the other does not (E. Veach and L. Guibas, SIGGRAPH 1995; P. Bekaert, M. Sbert and J. Halton, "Accelerating
-// Path Tracing by Re-Using Paths", EGWR 2002). Weights are the balance heuristic's, pair by pair (B. Bitterli, "Correlations and
-// Reuse for Fast and Accurate Physically Based Light Transport", 2021, §9.1): of K neighbours each shares 1/K of this
+// Neighbours' cones end on surfaces that this point sees too, in another direction and at another distance. A cone of block i ends
+// at y with density g_i/π per area, g_i = cosθ_i cosθ_y/r_i²; what y sends here is L g_c/π per area. So its light counts here by
+// g_c/g_i: neighbours add no blur, but for what one point sees and the other does not (E. Veach and L. Guibas, SIGGRAPH 1995;
+// P. Bekaert, M. Sbert and J. Halton, "Accelerating Path Tracing by Re-Using Paths", EGWR 2002). Weights are the balance heuristic's,
+// pair by pair (B. Bitterli, "Correlations and Reuse for Fast and Accurate Physically Based Light Transport", 2022): of K neighbours each shares 1/K of this
 // point's cones, so that a cone of its own counts by Σ_i (g_c/K)/(g_i + g_c/K)/K, a neighbour's by g_c/(g_i + g_c/K)/K, which never
 // exceeds a cone's full weight. Both add up to one for every y.
 //
@@ -48,7 +48,7 @@ bool see_each_other(Gatherer here, Gatherer there)
 void add_hit(inout Gathered sum, inout float weights, Gatherer g, Hit hit, float weight)
 {
     weights += weight;
-    if (max3(hit.radiance) > 0.0) {
+    if (hit.radiance != vec3(0.0)) {
         sum.radiance += hit.radiance * weight;
         sum.direction += directional(normalize(hit.offset), g.n, hit.radiance * weight);
     }
