@@ -9,6 +9,7 @@ from conftest import make
 
 from gi_addon.compare import scenes
 from gi_addon.compare.closed_forms import polygon_form_factor
+from gi_addon.compare.stability_checks import wall_reference
 from gi_addon.gl import GL, shared
 from gi_addon.outputs import OUTPUTS
 from gi_addon.passes.voxels import VoxelGrid, voxel_grid
@@ -456,3 +457,13 @@ def test_every_effect_is_on_its_switch(gl, off, title):
 
     assert title in titles()
     assert title not in titles(**{off: False})
+
+
+def test_shared_cones_add_no_light_and_lose_none(gl):
+    """A lit floor against a wall: E/π on the wall by the floor's form factor. Hits of blocks around weigh by how each point faces
+    them; without the cosine at the floor the wall was 9 % too bright."""
+    scene = scenes.corner()
+    floor = np.array([[-1.0, 0, 0], [1, 0, 0], [1, 1, 0], [-1, 1, 0]])
+    exact = wall_reference(scene.camera, (64, 36), floor, 0.8 * 5.0)
+    image = vct(scene, "Diffuse Indirect", samples=8, resolution=(64, 36), use_ao=False).passes["Diffuse Indirect"][..., 0]
+    assert abs(np.nansum(np.where(np.isnan(exact), np.nan, image)) / np.nansum(exact) - 1.0) <= 0.03
