@@ -27,25 +27,28 @@ SHARES = {"PREVIEW": 0.25, "BALANCED": 1.0, "FINAL": 4.0}
 
 # What a preset of our own takes back of the paper's.
 _OURS: dict[str, Any] = {
-    "rsm.visibility": "CELLS", "lpv.cascades": "AUTO", "vct.shadow_cones": False, "vct.continuous_voxelization": False,
+    "share_reflections": True, "rsm.visibility": "CELLS", "lpv.cascades": "AUTO", "vct.shadow_cones": False,
+    "vct.continuous_voxelization": False, "ssdo.layers": 2, "ssdo.margin": 0.25,
 }  # fmt: skip
 
 PRESETS: dict[str, Preset] = {
     "PAPER": Preset(
         "Paper", "Each technique as the paper's section VI measures it: a row of Table 2, one bounce, one sub-frame",
         # RSM: 512², one of four sets, virtual lights without visibility, Mittring's occlusion by single points. LPV: 32³. VCT: a
-        # shadow cone, voxels made anew in each frame. SSDO: the smallest set, Mittring's occlusion, shadow maps. The paper names
-        # neither its numbers of cones for diffuse light nor of iterations; LPV's iterations end when all light has arrived.
-        {"samples": 1, "viewport_samples": 1, "bounces": 1, "gather_scale": 4, "ao.steps": 1, "rsm.resolution": 512,
-         "rsm.samples": 200, "rsm.visibility": "NONE", "lpv.resolution": 32, "lpv.cascades": "1", "vct.resolution": 128,
-         "vct.cones": 12, "vct.shadow_cones": True, "vct.continuous_voxelization": True, "ssdo.samples": 100},
+        # shadow cone, voxels made anew in each frame. SSDO: the smallest set, what the picture shows and no more, Mittring's
+        # occlusion, shadow maps. A ray of each pixel's own for reflections. The paper names neither its numbers of cones for
+        # diffuse light nor of iterations; LPV's iterations end when all light has arrived.
+        {"samples": 1, "viewport_samples": 1, "bounces": 1, "share_reflections": False, "gather_scale": 4, "ao.steps": 1,
+         "rsm.resolution": 512, "rsm.samples": 200, "rsm.visibility": "NONE", "lpv.resolution": 32, "lpv.cascades": "1",
+         "vct.resolution": 128, "vct.cones": 12, "vct.shadow_cones": True, "vct.continuous_voxelization": True,
+         "ssdo.samples": 100, "ssdo.layers": 1, "ssdo.margin": 0.0},
     ),
     "PREVIEW": Preset(
         "Preview", "The fastest picture worth looking at: small maps, few samples, one bounce",
         {**_OURS, "samples": 1, "viewport_samples": 8, "bounces": 1, "gather_scale": 8, "shadows.resolution": 512, "ao.steps": 6,
          "world.samples": 2, "world.resolution": 256,
          "rsm.resolution": 256, "rsm.samples": 64, "lpv.resolution": 16, "vct.resolution": 32,
-         "vct.cones": 12, "ssdo.samples": 64},
+         "vct.cones": 12, "ssdo.samples": 64, "ssdo.layers": 1, "ssdo.margin": 0.1},
     ),
     # Against a Cycles that bounces on, later bounces are worth more than all else, and in grids they cost next to nothing
     # while the light stands still. Sub-frames average every other noise, so each takes fewer virtual lights the more there are.

@@ -34,9 +34,9 @@ CHARACTER = {
 _TITLES = {"shadows": "Shadow Maps", "ao": "Ambient Occlusion", "world": "World Light", "volume": "Volumetric Light"}
 _GROUPS = [f.name for f in dataclasses.fields(Settings) if dataclasses.is_dataclass(getattr(Settings(), f.name))]
 _TECHNIQUES = {name: label for name, label, _ in TECHNIQUES}
-_SAMPLING = ("samples", "viewport_samples", "motion_steps")
+_SAMPLING = ("samples", "viewport_samples")
 _FILM = ("pixel_filter", "filter_width")
-_ELSEWHERE = {"technique", *RESOURCES, *_SAMPLING, *_FILM}
+_ELSEWHERE = {"technique", "motion_steps", *RESOURCES, *_SAMPLING, *_FILM}
 _TOP = [path for path, _, _ in walk() if "." not in path]
 _ICONS = {"own": "CHECKMARK", "shared": "LINKED", "none": "X"}
 _KINDS = {"own": "own", "shared": "shared pass", "none": "not possible"}
@@ -162,10 +162,8 @@ class QUARTET_PT_sampling(_Panel, bpy.types.Panel):
 
     def draw(self, context):
         column = self._column()
-        for name, text in zip(_SAMPLING, ("Render", "Viewport", "Motion Steps"), strict=True):
-            row = column.row()
-            row.active = name != "motion_steps" or context.scene.render.use_motion_blur
-            row.prop(context.scene.quartet, name, text=text)
+        for name, text in zip(_SAMPLING, ("Render", "Viewport"), strict=True):
+            column.prop(context.scene.quartet, name, text=text)
 
 
 class QUARTET_PT_effects(_Panel, bpy.types.Panel):
@@ -194,6 +192,24 @@ class QUARTET_PT_effects(_Panel, bpy.types.Panel):
                 _say(column, f"{_KINDS[source.kind]}: {source.text}", "BLANK1", active=False)
                 if source.detail:
                     _say(column, source.detail, "BLANK1", active=False)
+
+
+class QUARTET_PT_motion_blur(_Panel, bpy.types.Panel):
+    """Blender's own settings of the shutter, which no panel of its own shows for other engines than Cycles and EEVEE."""
+
+    bl_label = "Motion Blur"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw_header(self, context):
+        self.layout.prop(context.scene.render, "use_motion_blur", text="")
+
+    def draw(self, context):
+        render = context.scene.render
+        column = self._column()
+        column.active = render.use_motion_blur
+        column.prop(render, "motion_blur_position", text="Position")
+        column.prop(render, "motion_blur_shutter")
+        column.prop(context.scene.quartet, "motion_steps", text="Steps")
 
 
 class QUARTET_PT_film(_Panel, bpy.types.Panel):
@@ -435,7 +451,7 @@ _classes: list[type] = []
 
 def register() -> None:
     _classes[:] = [QUARTET_PT_presets, QUARTET_PT_technique, QUARTET_PT_sampling, QUARTET_PT_effects, *_group_panels(),
-                   QUARTET_PT_film, QUARTET_PT_performance, QUARTET_PT_materials, QUARTET_PT_compare,
+                   QUARTET_PT_motion_blur, QUARTET_PT_film, QUARTET_PT_performance, QUARTET_PT_materials, QUARTET_PT_compare,
                    QUARTET_PT_passes, QUARTET_PT_object_visibility, QUARTET_PT_light_shadow,
                    QUARTET_PT_world_distance]  # fmt: skip
     for cls in _classes:

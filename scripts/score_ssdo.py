@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """SSDO on scenes made by code against one bounce of Cycles: the numbers of docs/techniques/ssdo.md.
 
-``.venv/bin/python scripts/score_ssdo.py indirect mirrors occlusion translucency`` prints a table each; ``-o FOLDER`` writes sheets.
+``.venv/bin/python scripts/score_ssdo.py indirect mirrors occlusion translucency`` prints tables; ``-o FOLDER`` writes sheets.
 """
 
 from __future__ import annotations
@@ -49,7 +49,8 @@ def mirror_room(roughness: float):
     b.quads(np.array([[[-1.5, 1.5, 0], [1.5, 1.5, 0], [1.5, 1.5, 1.5], [-1.5, 1.5, 1.5]]]), scenes.diffuse((0.7, 0.7, 0.6)))
     b.quads(scenes.box_quads((-0.8, 0.3, 0.0), (-0.3, 0.8, 0.7)), scenes.diffuse((0.8, 0.2, 0.1)))
     b.quads(scenes.box_quads((0.2, 0.5, 0.0), (0.8, 1.0, 0.4)), scenes.diffuse((0.1, 0.3, 0.8)))
-    b.light(scenes.sun_light((0.3, 1.0, -0.9), 4.0))
+    # Along the floor, which would else throw it on as if it were diffuse.
+    b.light(scenes.sun_light((0.25, 1.0, 0.0), 4.0))
     return b.build(scenes.perspective((0, -3.4, 1.3), (0, 0.4, 0.35), 0.75))
 
 

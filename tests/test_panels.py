@@ -439,6 +439,18 @@ def test_a_multilayer_file_of_blender_is_read_alike(context, gl, monkeypatch):
         assert np.array_equal(with_package[name], without[name]), name
 
 
+def thumbnail(data) -> np.ndarray:
+    """(H, W, 4) of the thumbnail that Blender has Quartet render of a material or a light."""
+    data.asset_generate_preview()
+    preview = data.preview_ensure()
+    for _ in range(600):  # the preview job runs beside
+        if any(preview.image_pixels_float):
+            break
+        time.sleep(0.05)
+    width, height = preview.image_size
+    return np.array(preview.image_pixels_float).reshape(height, width, 4)
+
+
 @pytest.mark.blender
 def test_thumbnails_show_the_material(context, gl, blender):
     """Blender's preview scene rendered by Quartet: a red ball is red, in the middle, before something else."""
@@ -447,13 +459,19 @@ def test_thumbnails_show_the_material(context, gl, blender):
 
     node_tree(material).nodes["Principled BSDF"].inputs["Base Color"].default_value = (0.8, 0.02, 0.02, 1.0)
     blender.context.scene.render.engine = "QUARTET"
-    material.asset_generate_preview()
-    preview = material.preview_ensure()
-    for _ in range(600):  # the preview job runs beside
-        if any(preview.image_pixels_float):
-            break
-        time.sleep(0.05)
-    width, height = preview.image_size
-    pixels = np.array(preview.image_pixels_float).reshape(height, width, 4)
-    red, green, _, alpha = pixels[height // 2, width // 2]
+    pixels = thumbnail(material)
+    red, green, _, alpha = pixels[pixels.shape[0] // 2, pixels.shape[1] // 2]
     assert alpha > 0.9 and red > 0.1 and red > 1.5 * green
+
+
+@pytest.mark.blender
+def test_a_lights_thumbnail_is_cycles_own(context, gl, blender):
+    """A green lamp of 10 W: the thumbnail's mean colour, after the view transform, is that of Cycles' within 2 %."""
+    means = {}
+    for engine in ("QUARTET", "CYCLES"):
+        blender.context.scene.render.engine = engine
+        lamp = blender.data.lights.new(engine, "POINT")
+        lamp.energy, lamp.color = 10.0, (0.0, 1.0, 0.0)
+        means[engine] = thumbnail(lamp)[..., :3].mean(axis=(0, 1))
+    assert means["CYCLES"][1] > 0.1
+    assert np.abs(means["QUARTET"] - means["CYCLES"]).max() < 0.02 * means["CYCLES"][1]

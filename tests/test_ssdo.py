@@ -517,6 +517,22 @@ def test_a_mirror_shows_the_wall_behind_it_as_bright_as_it_is(gl):
     assert seen == pytest.approx(np.full_like(seen, wall), rel=0.01)
 
 
+def test_a_mirror_shows_the_wall_down_to_its_foot(gl):
+    """In the last pixels of the floor the ray is behind the wall's plane as soon as it enters the wall's pixel: it met it within
+    one, and does not pass behind it."""
+    b = scenes.SceneBuilder()
+    b.quads(FLOOR[None], scenes.principled(Metallic=1.0, Roughness=0.0, Base_Color=(1, 1, 1, 1)))
+    b.quads(np.array([[[-1, 1, 0], [1, 1, 0], [1, 1, 1], [-1, 1, 1]]]), scenes.diffuse((0.8,) * 3))
+    b.light(scenes.sun_light((0, 1, -1), 5.0))
+    scene = b.build(scenes.perspective((0, -3.2, 1.0), (0, 0.3, 0.4), 0.9))
+    p = ssdo(scene, "Glossy Indirect", "Glossy Color", "Normal", samples=1, use_indirect_diffuse=False).passes
+    lit = (p["Glossy Indirect"] * p["Glossy Color"])[..., 0]
+    floor = p["Normal"][..., 2] > 0.99
+    foot = (floor & ~np.roll(floor, -1, axis=0))[:, 30:66]  # row 0 at the bottom: the floor's highest pixels
+    assert foot.sum() >= 30
+    assert lit[:, 30:66][foot] == pytest.approx(0.8 * 5.0 / np.sqrt(2.0) / np.pi, rel=0.02)
+
+
 def test_a_rough_mirror_reflects_less_of_a_small_wall(gl):
     """A wide lobe looks past the wall: dimmer, not darker than half; and off is off."""
     seen, wall = mirror(0.35)

@@ -67,12 +67,12 @@ KNOWN: dict[tuple[str, str], str] = {
     "surroundings passes below the grid's steps: around it L is 0.6 of what it should be, one cell higher 0.97; keeping L past "
     "the steps gives 0.97, but does not keep flux",
     ("LPV", "4"): "in 12 cells the looked-up light is 2 % too much, and so is each bounce: .5075 for .5; the flux itself is kept",
-    ("VCT", "6"): "one sub-frame's directions are noise that moves with the pixels: 2.9 %, 1.5 % with four times the cones",
-    ("VCT", "7"): "edges of surfaces are known by quarters of a cell: in most steps of 1/24 cell nothing changes",
-    ("VCT", "8"): "the same noise of one sub-frame: .65 % of .5 %, .54 % with four times the cones",
-    ("VCT", "9"): "4 sub-frames are noise where little of the floor is seen: 12 %; four times the cones leave "
-    "2.4 %, 32 sub-frames .8 %",
-    ("VCT", "10"): "axes of cones either meet a small source or not: 4.6 % in 16 sub-frames, 2.3 % with four times the cones",
+    ("VCT", "6"): "the error of some hundred directions changes as points move by half a pixel: 3.1 %, 1.6 % with four times "
+    "the cones",
+    ("VCT", "7"): "edges are where they are, but a cone's end is on the plate or not: of the few cones that end by its edges "
+    "none changes in 15 of 24 steps, in 1 where every pixel gathers",
+    ("VCT", "8"): "the same error of one sub-frame: 1.1 % of .5 %, .73 % with four times the cones, .3 % where every pixel "
+    "gathers",
     ("SSDO", "6"): "the lit floor's edge moves by whole pixels, ± 2.5 % at the wall's top: .0104; finding that edge between the "
     "samples to a pixel's precision gives .0135; 4 sub-frames leave .007",
 }

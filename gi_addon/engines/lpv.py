@@ -627,7 +627,7 @@ def _set_ray(frame: Frame, program, facts: Facts, **more) -> None:
 
 def _ray_defines(facts: Facts) -> dict[str, int]:
     # raycast_lib can gather virtual lights; here are none.
-    return {"MESH_LIGHTS": 0, **_defines(facts, chooses=True), **medium_defines(facts)}
+    return {"MESH_LIGHTS": 0, "VISIBILITY_RAYS": 0, **_defines(facts, chooses=True), **medium_defines(facts)}
 
 
 class GlossyLighting(ScreenPass):

@@ -13,13 +13,15 @@ from ..frame import Frame
 from ..graph import Optional, Pass, Planned, Texture, Uniform
 from ..passes.brdf_tables import BRDFTables
 from ..passes.direct_lighting import DirectLighting, TranslucentLighting
-from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint
+from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint, gather_size
 from ..passes.lights import LightList, RSMGeneration, ShadowMaps
 from ..passes.occupancy import Occupancy
 from ..passes.reflections import GLOSSY_RAY, GLOSSY_TRACED, reflection_sharing
 from ..passes.resolve import Resolve
 from ..passes.screen import (
+    DIRECTION,
     INDIRECT_DIFFUSE,
+    LIGHT,
     LOBE,
     REFRACTING,
     TRANSMISSION_INDIRECT,
@@ -29,7 +31,6 @@ from ..passes.screen import (
     no_gloss,
     no_indirect,
 )
-from ..passes.smoothing import BlockSmoothing, raw_gather
 from ..passes.subsurface import Subsurface, SubsurfaceBack
 from ..passes.volumetric import MEDIUM_UNIFORMS, Volumetric, medium_defines, set_medium
 from ..passes.voxels import GRID_UNIFORMS, VoxelGrid, Voxelisation, voxel_atlas, voxel_grid
@@ -55,8 +56,8 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         TranslucentTint(),
         GBufferMips(),
         VoxelAO(),
-        InterpolatedIndirect(),
-        BlockSmoothing("indirect.low", "Voxel Interpolated Indirect Lighting (smoothing)"),
+        ConeHits(),
+        SharedHits(),
         IndirectLighting(),
         GlossyCones(),
         *reflection_sharing(settings),
@@ -86,7 +87,8 @@ class RadianceInjection(Pass):
     title = "Voxel Radiance Injection"
     figure = "Voxel Radiance Injection, Voxel Anisotropic Mipmap Generation"
     reads = (
-        "voxels.sheets", "voxels.kinds", "voxels.albedo", Optional("voxels.emission"), Optional("voxels.lamps"),
+        "voxels.sheets", "voxels.kinds", "voxels.albedo", Optional("voxels.extents", ("vct.bounce",)),
+        Optional("voxels.emission"), Optional("voxels.lamps"),
         Optional("rsm.depth"), Optional("rsm.albedo"), Optional("rsm.normal"), Optional("rsm.lights"), Optional("rsm.views"),
     )  # fmt: skip
     writes = (
@@ -168,7 +170,7 @@ def build_mips(frame: Frame, planned: Planned, grid: VoxelGrid) -> None:
 
 
 # What cones read.
-_VOLUMES = ("vct.radiance", "vct.back", "voxels.sheets", "voxels.kinds")
+_VOLUMES = ("vct.radiance", "vct.back", "voxels.sheets", "voxels.extents", "voxels.kinds")
 _CONE_UNIFORMS = (
     *GRID_UNIFORMS,
     Uniform("grid_levels", "float", "mips above the cells"),
@@ -185,22 +187,54 @@ def _set_cones(frame: Frame, program, facts: Facts) -> None:
     )  # fmt: skip
 
 
-class InterpolatedIndirect(ScreenPass):
-    """Indirect light at one pixel per block."""
+_BLOCKS = ("gbuffer.low_depth", "gbuffer.low_normal", "gbuffer.low_pixel")
+
+
+def _hits_defines(facts: Facts) -> dict[str, int]:
+    return {"GATHER_SCALE": facts.settings.gather_scale, "CONES": facts.settings.vct.cones}
+
+
+class ConeHits(Pass):
+    """Where the cones of one pixel per block end."""
 
     title = "Voxel Interpolated Indirect Lighting Computation"
-    reads = (*_VOLUMES, "gbuffer.low_depth", "gbuffer.low_normal", "gbuffer.low_pixel")
-    writes = raw_gather("indirect.low")
+    figure = "Voxel Interpolated Indirect Lighting Computation"
+    reads = (*_VOLUMES, *_BLOCKS)
+    writes = (
+        Texture("vct.hits", "cone_hits", "packed (hits_lib.glsl): offset to what a cone of the block met first, cells; its "
+                "normal; radiance that it brings, W/(m²·sr)", "rgba32ui", lambda f: (*gather_size(f), f.settings.vct.cones),
+                layers=True, scratch=True),
+    )  # fmt: skip
     uniforms = _CONE_UNIFORMS
-    fragment = "engines/vct/gather_low_frag.glsl"
+    shaders = {"main": {"compute": "engines/vct/gather_low_comp.glsl"}}
 
     def defines(self, facts: Facts) -> dict[str, int]:
-        return {"GATHER_SCALE": facts.settings.gather_scale}
+        return _hits_defines(facts)
 
     def absent(self, facts: Facts) -> str | None:
-        if facts.settings.gather_scale == 1:
-            return "every pixel gathers for itself"
         return no_indirect(facts) or _unlit(facts)
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        program = frame.program(planned)
+        _set_cones(frame, program, planned.facts)
+        frame.compute(planned, program, gather_size(planned.facts))
+
+
+class SharedHits(ScreenPass):
+    """Indirect light at one pixel per block, by the hits of all blocks around."""
+
+    title = "Voxel Interpolated Indirect Lighting (shared cones)"
+    figure = "Voxel Interpolated Indirect Lighting Computation"
+    reads = (*_VOLUMES, *_BLOCKS, "vct.hits")
+    writes = (
+        Texture("indirect.low", "low_indirect", LIGHT, "rgba32f", gather_size, scratch=True),
+        Texture("indirect.low.direction", "low_direction", DIRECTION, "rgba32f", gather_size, scratch=True),
+    )  # fmt: skip
+    uniforms = _CONE_UNIFORMS
+    fragment = "engines/vct/share_frag.glsl"
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return _hits_defines(facts)
 
     def prepare(self, frame: Frame, planned: Planned, program) -> None:
         _set_cones(frame, program, planned.facts)
@@ -212,15 +246,14 @@ class IndirectLighting(ScreenPass):
     title = "Voxel Lighting Computation"
     figure = "Voxel Lighting Computation"
     reads = (
-        *_VOLUMES, "gbuffer.depth", "gbuffer.normal", Optional("gbuffer.low_depth"), Optional("gbuffer.low_normal"),
-        Optional("gbuffer.low_pixel"), Optional("indirect.low"), Optional("indirect.low.direction"),
+        *_VOLUMES, "gbuffer.depth", "gbuffer.normal", *_BLOCKS, "vct.hits", "indirect.low", "indirect.low.direction",
     )  # fmt: skip
     writes = (INDIRECT_DIFFUSE,)
     uniforms = _CONE_UNIFORMS
     fragment = "engines/vct/lighting_frag.glsl"
 
     def defines(self, facts: Facts) -> dict[str, int]:
-        return {"GATHER_SCALE": facts.settings.gather_scale}
+        return _hits_defines(facts)
 
     def absent(self, facts: Facts) -> str | None:
         return no_indirect(facts) or _unlit(facts)

@@ -10,6 +10,7 @@ from ..frame import FULLSCREEN, Frame
 from ..graph import Optional, Pass, Planned, Texture
 
 LIGHT = "radiance a white Lambert surface would reflect, W/(m²·sr)"
+DIRECTION = "Σ luminance × direction, and Σ luminance, of what arrives"
 
 
 class ScreenPass(Pass):

@@ -6,9 +6,7 @@ from __future__ import annotations
 from ..facts import Facts
 from ..graph import Texture
 from .gbuffer import gather_size
-from .screen import LIGHT, ScreenPass
-
-_DIRECTION = "Σ luminance × direction, and Σ luminance, of what arrives"
+from .screen import DIRECTION, LIGHT, ScreenPass
 
 
 def raw_gather(low: str) -> tuple[Texture, Texture]:
@@ -16,7 +14,7 @@ def raw_gather(low: str) -> tuple[Texture, Texture]:
     return (
         Texture(f"{low}.raw", "raw_indirect", f"{LIGHT}; mean of 1/distance of what it comes from, 1/m (0: not known)",
                 "rgba32f", gather_size, scratch=True),
-        Texture(f"{low}.raw_direction", "raw_direction", _DIRECTION, "rgba32f", gather_size, scratch=True),
+        Texture(f"{low}.raw_direction", "raw_direction", DIRECTION, "rgba32f", gather_size, scratch=True),
     )
 
 
@@ -31,7 +29,7 @@ class BlockSmoothing(ScreenPass):
         self.reads = (f"{low}.raw", f"{low}.raw_direction", "gbuffer.low_depth", "gbuffer.low_normal", "gbuffer.low_pixel")
         self.writes = (
             Texture(low, "low_indirect", LIGHT, "rgba32f", gather_size, scratch=True),
-            Texture(f"{low}.direction", "low_direction", _DIRECTION, "rgba32f", gather_size, scratch=True),
+            Texture(f"{low}.direction", "low_direction", DIRECTION, "rgba32f", gather_size, scratch=True),
         )  # fmt: skip
 
     def defines(self, facts: Facts) -> dict[str, int]:

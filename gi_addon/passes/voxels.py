@@ -2,8 +2,9 @@
 """The scene in voxels: per cell and side the sheet of surface that faces it most, and albedo and emission averaged by area.
 
 A triangle faces one of the six sides (±x, ±y, ±z) most. What faces the same side of a cell is one sheet: a plane, the mean of
-its triangles', and which of 4 × 4 squares of the cell's face it covers. So a flat surface is where it is, not where its cell
-is, a wall thinner than a cell has two sides, and an edge is known to a quarter of a cell.
+its triangles', which of 4 × 4 squares of the cell's face it covers, and how far it reaches along the two axes of the face. So a
+flat surface is where it is, not where its cell is, a wall thinner than a cell has two sides, an edge along an axis is where it
+is, and another is known to a quarter of a cell.
 
 Every triangle is drawn along the axis that it faces most, grown by half a cell, and clipped exactly against each cell it
 meets: none is missed, and each adds the area that lies inside. Sums are integers, so that the order of drawing does not
@@ -26,8 +27,8 @@ from ..scene import DIFFUSE
 # Sums are fixed point: this many units are one cell face of area. 32 bits then hold 4096 layers of surface in one cell.
 UNITS = 1 << 20
 # Words per cell: area, area × opacity, albedo; of each of six sheets its area, slopes and height; squares covered; how much of
-# what is reflected is diffuse; emission; area of lamps by side.
-_WORDS, _EMISSION_WORDS, _LAMP_WORDS = 33, 3, 6
+# what is reflected is diffuse; how far each sheet reaches; emission; area of lamps by side.
+_WORDS, _EMISSION_WORDS, _LAMP_WORDS = 57, 3, 6
 # For the sums of the layers that are made at once; OpenGL 4.3 promises storage blocks of no more than 128 MiB.
 _SLAB_BYTES = 128 * MIB
 
@@ -108,6 +109,8 @@ class Voxelisation(Pass):
     writes = (
         Texture("voxels.sheets", "voxel_sheets", "by side and axis: ½ + ½ slopes and ½ + ⅓ height of the sheet over the cell's "
                 "middle, in cells; a bit for each square that it covers, over 65535", "rgba16", voxel_atlas),
+        Texture("voxels.extents", "voxel_extents", "by side and axis: how far the sheet reaches over the cell's face, "
+                "down u and v from its far sides, and up from its near ones", "rgba8", voxel_atlas),
         Texture("voxels.kinds", "voxel_kinds", "a bit for each kind of sheet in the cell or, in an empty one, 64 + level of the "
                 "largest empty block around it, over 255; mean opacity", "rg8", _size,
                 mips=lambda f: voxel_grid(f).levels, scratch=True),

@@ -1,5 +1,7 @@
 // Sums of the layers in the making to means (passes/voxels.py says what a texel is).
 
+#include "passes/voxel_extent.glsl"
+
 layout(local_size_x = 4, local_size_y = 4, local_size_z = 4) in;
 
 float sum_at(uint at) { return float(int(voxel_sums[at])); }
@@ -23,8 +25,13 @@ void main()
         uint bits = voxel_sums[first + 29u + uint(part >> 1)] >> (16 * (part & 1)) & 0xFFFFu;
         vec3 plane = share > 0.0 ? vec3(sum_at(sheet + 1u), sum_at(sheet + 2u), sum_at(sheet + 3u)) / share : vec3(0.0);
         kinds |= bits != 0u && opaque > 0.0 ? 1u << part : 0u;
-        imageStore(voxel_sheets, ivec3(cell.x + (part & 1) * grid_size.x, cell.y, cell.z + (part >> 1) * grid_size.z),
-                   vec4(0.5 + 0.5 * plane.xy, 0.5 + plane.z / 3.0, float(bits) / 65535.0));
+        ivec3 texel = ivec3(cell.x + (part & 1) * grid_size.x, cell.y, cell.z + (part >> 1) * grid_size.z);
+#if HAS_VOXEL_EXTENTS
+        uint reach = sheet_extent(first, part);
+        imageStore(voxel_extents, texel, vec4(voxel_sums[reach], voxel_sums[reach + 1u], voxel_sums[reach + 2u],
+                                              voxel_sums[reach + 3u]) / EXTENT_UNITS);
+#endif
+        imageStore(voxel_sheets, texel, vec4(0.5 + 0.5 * plane.xy, 0.5 + plane.z / 3.0, float(bits) / 65535.0));
     }
     imageStore(voxel_kinds, cell, vec4(float(kinds) / 255.0, opaque / max(weight, 1.0), 0.0, 0.0));
 #if HAS_VOXEL_ALBEDO
@@ -32,14 +39,14 @@ void main()
     imageStore(voxel_albedo, cell, vec4(min(albedo, vec3(1.0)), float(voxel_sums[first + 32u]) / max(weight, 1.0)));
 #endif
 #if HAS_VOXEL_EMISSION
-    vec3 emission = vec3(voxel_sums[first + 33u], voxel_sums[first + 34u], voxel_sums[first + 35u]);
+    vec3 emission = vec3(voxel_sums[first + 57u], voxel_sums[first + 58u], voxel_sums[first + 59u]);
     imageStore(voxel_emission, cell, vec4(emission * (emission_unit * float(VOXEL_UNITS) * color), 0.0));
 #endif
 #if HAS_VOXEL_LAMPS
     vec3 lamps = vec3(0.0);
     for (int axis = 0; axis < 3; ++axis) {
         // A lamp with two sides covers what one of them does.
-        lamps[axis] = float(max(voxel_sums[first + 33u + 2u * uint(axis)], voxel_sums[first + 34u + 2u * uint(axis)]));
+        lamps[axis] = float(max(voxel_sums[first + 57u + 2u * uint(axis)], voxel_sums[first + 58u + 2u * uint(axis)]));
     }
     imageStore(voxel_lamps, cell, vec4(min(lamps / float(VOXEL_UNITS), vec3(1.0)), 0.0));
 #endif

@@ -2,6 +2,7 @@
 // area, to the cell's sums. The sums are integers: the order does not matter.
 
 #include "surface/surface_point.glsl"
+#include "passes/voxel_extent.glsl"
 
 flat in vec3 triangle_a;
 flat in vec3 triangle_b;
@@ -87,6 +88,21 @@ uint squares_covered(vec3 polygon[MOST], int count, vec2 corner)
     return bits != 0u ? bits : 1u << (at.x + 4 * at.y);
 }
 
+// How far the polygon reaches over the cell's face: from its far sides to where it begins along u and v, and from its near
+// ones to where it ends.
+vec4 covered_extent(vec3 polygon[MOST], int count, vec2 corner)
+{
+    vec2 low = vec2(1.0);
+    vec2 high = vec2(0.0);
+    for (int i = 0; i < MOST; ++i) {
+        if (i < count) {
+            low = min(low, polygon[i].xy - corner);
+            high = max(high, polygon[i].xy - corner);
+        }
+    }
+    return clamp(vec4(1.0 - low, high), 0.0, 1.0);
+}
+
 void main()
 {
     vec3 front = dot(vary_normal_ws, triangle_normal_ws) < 0.0 ? -triangle_normal_ws : triangle_normal_ws;
@@ -164,15 +180,20 @@ void main()
         add(sheet + 1u, share * slope.x);
         add(sheet + 2u, share * slope.y);
         add(sheet + 3u, share * clamp(height, -1.5, 1.5));
+        // What of the face lies within: the largest of its ends, either way from the cell's sides, and of no more than rounds.
+        vec4 extent = covered_extent(part, corners, column);
+        for (int i = 0; i < 4; ++i) {
+            atomicMax(voxel_sums[sheet_extent(at, 2 * triangle_axis + side) + uint(i)], uint(ceil(extent[i] * EXTENT_UNITS)));
+        }
         atomicOr(voxel_sums[at + 29u + uint(triangle_axis)], squares_covered(part, corners, column) << (16 * side));
 #if VOXEL_EMISSION
         float scale = weight / (float(VOXEL_UNITS) * emission_unit);
-        add(at + 33u, c.emission.r * scale);
-        add(at + 34u, c.emission.g * scale);
-        add(at + 35u, c.emission.b * scale);
+        add(at + 57u, c.emission.r * scale);
+        add(at + 58u, c.emission.g * scale);
+        add(at + 59u, c.emission.b * scale);
 #elif VOXEL_LAMPS
         if (max3(c.emission) > 0.0) {
-            add(at + 33u + uint(2 * triangle_axis + side), seen * float(VOXEL_UNITS));
+            add(at + 57u + uint(2 * triangle_axis + side), seen * float(VOXEL_UNITS));
         }
 #endif
     }

@@ -25,6 +25,7 @@ Traced trace(vec3 start_ws, vec3 direction_ws, float reach, float thickness)
     vec2 way = b.xy - a.xy;
     // Where the ray crosses columns and rows: far away in s for a ray that does not.
     vec2 per_way = 1.0 / mix(way, vec2(1e-6), lessThan(abs(way), vec2(1e-6)));
+    float per_pixel = inversesqrt(max(dot(way, way), 1.0)); // share of the way
     vec2 forward = vec2(greaterThan(per_way, vec2(0.0)));
     int top = textureQueryLevels(ssdo_pyramid) - 1;
     ivec2 last = textureSize(ssdo_planes, 0) - 1;
@@ -56,7 +57,10 @@ Traced trace(vec3 start_ws, vec3 direction_ws, float reach, float thickness)
                     bool side = gap < -rounding;
                     float s_hit = side || gap_exit >= 0.0 ? s : mix(s, s_exit, max(gap, 0.0) / (max(gap, 0.0) - gap_exit));
                     float t = perspective ? far * s_hit * b.z / mix(a.z, b.z, s_hit) : far * s_hit;
-                    bool enters = side ? depth_of_nearness(p.z) - depth_of_nearness(surface) <= thickness * t
+                    // A surface is known to a pixel: what the ray was before a pixel ago, it has met on the way.
+                    vec3 ago = mix(a, b, max(s - per_pixel, 0.0));
+                    bool met = ago.z - plane_near(plane, pixel, ago.xy) > rounding;
+                    bool enters = side ? met || depth_of_nearness(p.z) - depth_of_nearness(surface) <= thickness * t
                                        : gap_exit < -rounding;
                     if (enters) {
                         hit.found = true;

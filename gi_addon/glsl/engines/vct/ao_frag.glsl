@@ -20,12 +20,12 @@ void main()
     mat3 frame = frame_from_normal(n);
     Grid grid = voxel_grid();
     Cone cone = surface_cone(grid, position_ws, ng, n, 0.0, ao_distance);
-    uint run = cone_run(false);
+    uint run = cone_run(ivec2(0));
     float open_ = 0.0;
     for (int i = 0; i < cone_count; ++i) {
         cone.direction = frame * cone_direction(run + uint(i));
         if (dot(cone.direction, ng) > 0.0) {
-            open_ += trace_open(voxel_sheets, voxel_kinds, grid, cone);
+            open_ += trace_open(voxel_sheets, voxel_extents, voxel_kinds, grid, cone);
         }
     }
     ao = vec2(open_ / float(cone_count), 1.0);

@@ -17,7 +17,7 @@ vec3 gathered(Grid grid, vec3 p, vec3 n, float leaving, uint turn)
     for (int i = 0; i < cone_count; ++i) {
         vec3 d = frame * cone_direction(turn + uint(i));
         Cone cone = Cone(p + LIFT * n, d, spread, 1e30, leaving);
-        sum += trace_cone(light_now, back_now, voxel_sheets, voxel_kinds, grid, cone).radiance;
+        sum += trace_cone(light_now, back_now, voxel_sheets, voxel_extents, voxel_kinds, grid, cone).radiance;
     }
     return sum / float(cone_count);
 }

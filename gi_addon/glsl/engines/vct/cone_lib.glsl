@@ -100,8 +100,16 @@ float cone_begin(Cone cone, Grid grid)
     return max(max(near.x, max(near.y, near.z)), 0.0);
 }
 
+// Whether a sheet reaches as far as (u, v), in cells from the cell's middle: to the seam, since by so much may the planes of
+// neighbouring cells be apart.
+bool reaches(sampler3D extents, ivec3 cell, ivec3 size, int part, vec2 uv)
+{
+    vec4 far = texelFetch(extents, part_texel(cell, size, part >> 1, part & 1), 0) + SEAM;
+    return all(lessThanEqual(vec4(0.5 - uv, 0.5 + uv), far));
+}
+
 // The first sheet in a cell that the ray meets between `t` and `t_out`.
-Meeting first_sheet(sampler3D sheets, Cone cone, ivec3 cell, ivec3 size, uint kinds, float t, float t_out)
+Meeting first_sheet(sampler3D sheets, sampler3D extents, Cone cone, ivec3 cell, ivec3 size, uint kinds, float t, float t_out)
 {
     Meeting first = NOTHING_MET;
     vec3 from = cone.start - vec3(cell) - 0.5;
@@ -128,7 +136,7 @@ Meeting first_sheet(sampler3D sheets, Cone cone, ivec3 cell, ivec3 size, uint ki
         float at = clamp(-height / (abs(rise) > 1e-9 ? rise : 1e-9), t, t_out);
         vec2 uv = across_axis(from + cone.direction * at, part >> 1);
         ivec2 square = clamp(ivec2(floor((uv + 0.5) * 4.0)), ivec2(0), ivec2(3));
-        if (at < first.t && (sheet.squares >> (square.x + 4 * square.y) & 1u) == 1u) {
+        if (at < first.t && (sheet.squares >> (square.x + 4 * square.y) & 1u) == 1u && reaches(extents, cell, size, part, uv)) {
             first = Meeting(at, part, front, cell, normalize(sheet.slant) * (front ? sign_ : -sign_), 0.0);
         }
     }
@@ -148,7 +156,7 @@ vec3 leaving_light(sampler3D atlas, sampler3D back, Grid grid, Cone cone, Meetin
 }
 
 // The next sheet on the ray's way from `t` to `end`; `t` ends behind its cell.
-Meeting next_sheet(sampler3D sheets, sampler3D kinds, Grid grid, Cone cone, float end, inout float t)
+Meeting next_sheet(sampler3D sheets, sampler3D extents, sampler3D kinds, Grid grid, Cone cone, float end, inout float t)
 {
     vec3 d = mix(cone.direction, vec3(1e-6), lessThan(abs(cone.direction), vec3(1e-6)));
     vec3 inverse = 1.0 / d;
@@ -167,7 +175,7 @@ Meeting next_sheet(sampler3D sheets, sampler3D kinds, Grid grid, Cone cone, floa
         vec3 out_at = (floor(p / width) * width + forward * width - p) * inverse;
         float t_out = t + max(min(out_at.x, min(out_at.y, out_at.z)), 0.0);
         if (found < 64u) {
-            met = first_sheet(sheets, cone, cell, size, found, t, min(t_out, end));
+            met = first_sheet(sheets, extents, cone, cell, size, found, t, min(t_out, end));
             met.opacity = met.t < end ? texel.g : 0.0;
         }
         t = t_out + 1e-3;
@@ -175,7 +183,7 @@ Meeting next_sheet(sampler3D sheets, sampler3D kinds, Grid grid, Cone cone, floa
     return met;
 }
 
-ConeResult trace_cone(sampler3D atlas, sampler3D back, sampler3D sheets, sampler3D kinds, Grid grid, Cone cone)
+ConeResult trace_cone(sampler3D atlas, sampler3D back, sampler3D sheets, sampler3D extents, sampler3D kinds, Grid grid, Cone cone)
 {
     ConeResult result = ConeResult(vec3(0.0), 1.0, NOTHING_MET);
     float end = cone_end(cone, grid);
@@ -184,7 +192,7 @@ ConeResult trace_cone(sampler3D atlas, sampler3D back, sampler3D sheets, sampler
         if (t >= end || result.transmittance < CONE_END) {
             break;
         }
-        Meeting met = next_sheet(sheets, kinds, grid, cone, end, t);
+        Meeting met = next_sheet(sheets, extents, kinds, grid, cone, end, t);
         if (met.t < end) {
             result.radiance += result.transmittance * met.opacity * leaving_light(atlas, back, grid, cone, met);
             result.transmittance *= 1.0 - met.opacity;
@@ -195,7 +203,7 @@ ConeResult trace_cone(sampler3D atlas, sampler3D back, sampler3D sheets, sampler
 }
 
 // The same without light: what of the cone is open.
-float trace_open(sampler3D sheets, sampler3D kinds, Grid grid, Cone cone)
+float trace_open(sampler3D sheets, sampler3D extents, sampler3D kinds, Grid grid, Cone cone)
 {
     float transmittance = 1.0;
     float end = cone_end(cone, grid);
@@ -204,7 +212,7 @@ float trace_open(sampler3D sheets, sampler3D kinds, Grid grid, Cone cone)
         if (t >= end || transmittance < CONE_END) {
             break;
         }
-        transmittance *= 1.0 - next_sheet(sheets, kinds, grid, cone, end, t).opacity;
+        transmittance *= 1.0 - next_sheet(sheets, extents, kinds, grid, cone, end, t).opacity;
     }
     return transmittance;
 }

@@ -12,7 +12,6 @@ Grid voxel_grid() { return Grid(grid_low, grid_cell, vec3(grid_size), grid_level
 struct Gathered {
     vec3 radiance;    // E/π, W/(m²·sr)
     vec4 direction;   // Σ luminance × direction; Σ luminance, per direction
-    float nearness;   // mean of 1/distance of the surfaces that it comes from, 1/m
 };
 
 // The cone that leaves a surface at `position_ws` along `direction`, `reach` m far.
@@ -22,37 +21,40 @@ Cone surface_cone(Grid grid, vec3 position_ws, vec3 ng, vec3 direction, float sp
     return Cone(p + LIFT * ng, direction, spread, reach / grid.cell, surface_side(voxel_sheets, voxel_kinds, grid, p, ng));
 }
 
-// Where this pixel's run of cones starts among those of all sub-frames. `turned`: 2 × 2 neighbours have runs one after
-// another, and the tent of passes/smooth_blocks_frag.glsl weighs the four alike wherever it stands.
-uint cone_run(bool turned)
+// Points side by side have runs of cones one after another: every SIDE × SIDE of them all runs of one fine set.
+const int SIDE = 5;
+
+// Where the run of the point at `place` (in pixels or blocks) starts among the cones of all sub-frames.
+uint cone_run(ivec2 place)
 {
-    uvec2 place = uvec2(gl_FragCoord.xy) & 1u;
-    uint run = turned ? place.x + 2u * place.y : 0u;
-    return (run * uint(cone_sets) + view.subframe) * uint(cone_count);
+    ivec2 p = place - SIDE * ivec2(floor(vec2(place) / float(SIDE)));
+    return (uint(p.x + SIDE * p.y) * uint(cone_sets) + view.subframe) * uint(cone_count);
 }
 
 float set_spread() { return cone_spread(1.0 / (float(cone_count) * cone_sets)); }
 
-Gathered gather_cones(vec3 position_ws, vec3 n, vec3 ng)
+// What a cone's light adds to the directional sums: per direction, not per projected one.
+vec4 directional(vec3 direction, vec3 n, vec3 radiance)
 {
-    Gathered g = Gathered(vec3(0.0), vec4(0.0), 0.0);
+    return vec4(direction, 1.0) * (luminance(radiance) / max(dot(direction, n), set_spread()));
+}
+
+// E/π by the point's own cones alone.
+Gathered gather_cones(ivec2 place, vec3 position_ws, vec3 n, vec3 ng)
+{
+    Gathered g = Gathered(vec3(0.0), vec4(0.0));
     Grid grid = voxel_grid();
     mat3 frame = frame_from_normal(n);
-    float spread = set_spread();
-    Cone cone = surface_cone(grid, position_ws, ng, n, spread, 1e30);
-    uint run = cone_run(true);
+    Cone cone = surface_cone(grid, position_ws, ng, n, set_spread(), 1e30);
+    uint run = cone_run(place);
     for (int i = 0; i < cone_count; ++i) {
-        vec3 local = cone_direction(run + uint(i));
-        cone.direction = frame * local;
+        cone.direction = frame * cone_direction(run + uint(i));
         if (dot(cone.direction, ng) <= 0.0) {
             continue; // into the triangle
         }
-        ConeResult result = trace_cone(voxel_radiance, voxel_back, voxel_sheets, voxel_kinds, grid, cone);
-        g.radiance += result.radiance;
-        g.nearness += 1.0 / max(result.first.t, LIFT);
-        g.direction += vec4(cone.direction, 1.0) * (luminance(result.radiance) / max(local.z, spread));
+        ConeResult result = trace_cone(voxel_radiance, voxel_back, voxel_sheets, voxel_extents, voxel_kinds, grid, cone);
+        g.radiance += result.radiance / float(cone_count);
+        g.direction += directional(cone.direction, n, result.radiance);
     }
-    g.radiance /= float(cone_count);
-    g.nearness /= float(cone_count) * grid.cell;
     return g;
 }

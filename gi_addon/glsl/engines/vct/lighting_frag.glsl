@@ -1,12 +1,15 @@
 // Indirect light per pixel: interpolated from the low resolution where that holds the pixel's surface, by cones of its
-// own where it does not (paper §IV-B, §IV-D).
+// own where it does not, which those of the blocks around complete (paper §IV-B, §IV-D).
 
 #include "lib/view_lib.glsl"
 #include "lib/sequence_lib.glsl"
+#include "lib/math_lib.glsl"
 #include "engines/vct/diffuse_lib.glsl"
-#if HAS_LOW_INDIRECT
 #include "passes/interpolate.glsl"
-#endif
+#include "engines/vct/share_lib.glsl"
+
+// Pixels that gather for themselves take of the blocks next to theirs only: of SIDE × SIDE costs as much again as their own cones.
+const int NEXT = 3;
 
 void main()
 {
@@ -16,17 +19,21 @@ void main()
     if (depth <= 0.0) {
         return;
     }
+#if GATHER_SCALE == 1
+    indirect_diffuse = vec4(texelFetch(low_indirect, pixel, 0).rgb, 1.0); // a block is its pixel
+#else
     vec3 position_ws = position_ws_from_depth(gl_FragCoord.xy * view.inverse_resolution, depth);
     vec4 normals = texelFetch(gbuf_normal, pixel, 0);
     vec3 n = octahedral_decode(normals.xy);
     vec3 ng = octahedral_decode(normals.zw);
-    vec3 radiance = vec3(0.0);
-    bool found = false;
-#if HAS_LOW_INDIRECT
-    found = interpolated_indirect(position_ws, n, ng, depth, radiance);
-#endif
-    if (!found) {
-        radiance = gather_cones(position_ws, n, ng).radiance;
+    vec3 radiance;
+    if (!interpolated_indirect(position_ws, n, ng, depth, radiance)) {
+        uvec4 own[CONES];
+        trace_hits(position_ws, n, ng, cone_run(pixel), own);
+        Gatherer here = gatherer(position_ws, n, ng);
+        ivec2 block = (pixel + gather_grid_offset()) / GATHER_SCALE;
+        radiance = shared_light(here, own, position_ws, float(GATHER_SCALE) * pixel_width(depth), block, NEXT, false).radiance;
     }
     indirect_diffuse = vec4(radiance, 1.0);
+#endif
 }

@@ -24,7 +24,7 @@ void main()
     vec3 ng = octahedral_decode(normals.zw);
     if (medium.y > 0.5) {
         vec2 uv = gl_FragCoord.xy * view.inverse_resolution;
-        Gathered behind = gather_cones(position_ws_from_depth(uv, depth), -octahedral_decode(normals.xy), -ng);
+        Gathered behind = gather_cones(pixel, position_ws_from_depth(uv, depth), -octahedral_decode(normals.xy), -ng);
         transmission_indirect = vec4(behind.radiance * tint, 1.0);
         return;
     }

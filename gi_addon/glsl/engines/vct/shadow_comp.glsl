@@ -38,7 +38,7 @@ void main()
                 vec3 d = cone_direction(turn + uint(k));
                 Cone cone = Cone(p + LIFT * ng, normalize(l + frame * vec3(d.xy, 0.0) * tan(min(angle, 0.785))), // 45°
                                  0.0, reach, side);
-                visible += trace_open(voxel_sheets, voxel_kinds, grid, cone) / float(cone_count);
+                visible += trace_open(voxel_sheets, voxel_extents, voxel_kinds, grid, cone) / float(cone_count);
             }
         }
         imageStore(shadow_cones, ivec3(pixel, i), vec4(visible));

@@ -1,0 +1,26 @@
+// Where the cones of each block's representative pixel end, and what light comes from there.
+
+#include "lib/view_lib.glsl"
+#include "lib/sequence_lib.glsl"
+#include "lib/math_lib.glsl"
+#include "passes/gather_receiver.glsl"
+#include "engines/vct/diffuse_lib.glsl"
+#include "engines/vct/hits_lib.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+
+void main()
+{
+    ivec2 block = ivec2(gl_GlobalInvocationID.xy);
+    if (any(greaterThanEqual(block, textureSize(low_depth, 0)))) {
+        return;
+    }
+    Receiver r = gather_receiver(block);
+    uvec4 hits[CONES];
+    if (r.exists) {
+        trace_hits(r.position_ws, r.n, r.ng, cone_run(block), hits);
+    }
+    for (int i = 0; i < CONES; ++i) {
+        imageStore(cone_hits, ivec3(block, i), r.exists ? hits[i] : uvec4(0u));
+    }
+}
