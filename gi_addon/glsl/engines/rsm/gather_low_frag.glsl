@@ -4,7 +4,7 @@
 #include "lib/sequence_lib.glsl"
 #include "lib/math_lib.glsl"
 #include "passes/gather_receiver.glsl"
-#include "engines/rsm/gather_lib.glsl"
+#include "engines/rsm/gather_all_lib.glsl"
 
 void main()
 {

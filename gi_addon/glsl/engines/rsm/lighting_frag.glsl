@@ -3,7 +3,7 @@
 
 #include "lib/view_lib.glsl"
 #include "lib/sequence_lib.glsl"
-#include "engines/rsm/gather_lib.glsl"
+#include "engines/rsm/gather_all_lib.glsl"
 #if HAS_LOW_INDIRECT
 #include "passes/interpolate.glsl"
 #endif

@@ -1,5 +1,5 @@
 // First-bounce lights in an order in which neighbours in the list are neighbours in a light's map: of such a list systematic
-// resampling (gather_lib.glsl) draws an even choice of places. Each finds its rank by comparing all keys.
+// resampling (gather_all_lib.glsl) draws an even choice of places. Each finds its rank by comparing all keys.
 
 layout(local_size_x = 64) in;
 
