@@ -150,25 +150,30 @@ def test_what_is_kept_between_changes_is_what_would_be_made_again(gl, technique)
         assert np.array_equal(picture, fresh), name
 
 
-def test_while_the_view_moves_the_skys_directions_stay_and_so_do_their_maps(gl, monkeypatch):
-    """Directions are aimed at what the camera sees: a turned view aims them anew, and draws their maps; a moving one does not,
-    and the first frame at rest does."""
+@pytest.fixture
+def drawn(monkeypatch):
+    """How many tiles of light maps each draw was of."""
     from gi_addon.passes import lights
 
+    counts = []
+    draw = lights._draw_tiles
+
+    def counted(*args, tiles, **kwargs):
+        counts.append(len(tiles))
+        return draw(*args, tiles=tiles, **kwargs)
+
+    monkeypatch.setattr(lights, "_draw_tiles", counted)
+    return counts
+
+
+def test_while_the_view_moves_the_skys_directions_stay_and_so_do_their_maps(gl, drawn):
+    """Directions are aimed at what the camera sees: a turned view aims them anew, and draws their maps; a moving one does not,
+    and the first frame at rest does."""
     settings = Settings()
     settings.samples = 4
     settings.rsm.resolution = settings.shadows.resolution = settings.world.resolution = 64
     scene = replace(scenes.cornell(), world=scenes.world((0.4, 0.5, 0.7)))
     turned = replace(scene.camera, world_from_view=scene.camera.world_from_view @ _turn(0.4))
-    drawn = []
-
-    def counted(*args, tiles, **kwargs):
-        drawn.append(len(tiles))
-        return draw(*args, tiles=tiles, **kwargs)
-
-    draw = lights._draw_tiles
-    monkeypatch.setattr(lights, "_draw_tiles", counted)
-
     def job(g):
         renderer, counts = Renderer(g), []
         try:
@@ -185,23 +190,12 @@ def test_while_the_view_moves_the_skys_directions_stay_and_so_do_their_maps(gl, 
     assert first > rest > moving == 0
 
 
-def test_light_maps_are_drawn_where_a_light_moved_and_nowhere_else(gl, monkeypatch):
+def test_light_maps_are_drawn_where_a_light_moved_and_nowhere_else(gl, drawn):
     """Tiles drawn for each change: none when the camera turns, the picture grows or a lamp's power changes; the moved lamp's own;
     all when a surface moves."""
-    from gi_addon.passes import lights
-
     settings = Settings()
     settings.samples = 4
     settings.rsm.resolution, settings.shadows.resolution = 64, 64
-    drawn = []
-
-    def counted(*args, tiles, **kwargs):
-        drawn.append(len(tiles))
-        return draw(*args, tiles=tiles, **kwargs)
-
-    draw = lights._draw_tiles
-    monkeypatch.setattr(lights, "_draw_tiles", counted)
-
     def job(g):
         renderer, counts = Renderer(g), {}
         try:
