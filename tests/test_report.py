@@ -16,6 +16,7 @@ import pytest
 from click.testing import CliRunner
 from conftest import ROOT
 
+from gi_addon import presets
 from gi_addon.compare import certificate, charts, effects, page, references, report, scenes, study, sweeps
 from gi_addon.compare.metrics import score
 from gi_addon.compare.references import Halves
@@ -100,7 +101,9 @@ def test_every_candidate_of_a_sweep_can_be_set(technique, sweep):
     assert len(found) == len(set(found)) >= {"none": 1, "presets": 3, "samples": 5, "quick": 6, "full": 10}[sweep]
     for candidate in found:
         settings = candidate.settings(Settings())
-        assert settings.technique == technique and all(settings.get(k) == v for k, v in candidate.options)
+        chosen = dict(candidate.options)
+        chosen = presets.PRESETS[chosen["preset"]].values if "preset" in chosen else chosen
+        assert settings.technique == technique and all(settings.get(k) == v for k, v in chosen.items())
     assert len(peer_sweep("cycles", sweep)) >= 4 and len(peer_sweep("eevee", sweep)) >= 2
 
 
