@@ -24,7 +24,7 @@ OTHER = {
     "volume.samples": 2, "volume.density": 0.2, "volume.anisotropy": 0.5, "rsm.visibility": "NONE",
     "rsm.visibility_resolution": 32, "rsm.visibility_rays": 32,
     "gather_scale": 1, "motion_steps": None,
-    "lpv.resolution": 16, "lpv.iterations": 2, "lpv.directions": "48", "lpv.occlusion": False,
+    "lpv.resolution": 16, "lpv.cascades": "2", "lpv.iterations": 2, "lpv.directions": "48", "lpv.occlusion": False,
 }  # fmt: skip
 # Not read by the picture itself: the viewport's own number of sub-frames; and effects whose techniques have yet to land.
 ELSEWHERE = {"viewport_samples", "motion_steps", "technique"}

@@ -283,6 +283,9 @@ def steps():
         if i in {marks!r}:
             yield settled
             changes[i] = memory()
+    # The step before is the factory's scene.
+    with here():
+        bpy.ops.ed.undo_push(message="built")
     for i in range(1, {undos!r} + 1):
         with here():
             if i % 2:
