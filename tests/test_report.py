@@ -98,7 +98,7 @@ def test_ready_references_are_averaged_in_blocks(tmp_path):
 @pytest.mark.parametrize("sweep", ["none", "presets", "samples", "quick", "full"])
 def test_every_candidate_of_a_sweep_can_be_set(technique, sweep):
     found = technique_sweep(technique, sweep)
-    assert len(found) == len(set(found)) >= {"none": 1, "presets": 3, "samples": 5, "quick": 6, "full": 10}[sweep]
+    assert len(found) == len(set(found)) >= {"none": 1, "presets": 3, "samples": 2, "quick": 6, "full": 10}[sweep]
     for candidate in found:
         settings = candidate.settings(Settings())
         chosen = dict(candidate.options)

@@ -61,11 +61,11 @@ def _candidate(method: str, options: dict) -> Candidate:
 
 
 def technique_sweep(technique: str, sweep: str) -> list[Candidate]:
-    """``none``: the scene's own settings; ``presets``: our own three; ``samples``: those and sub-frames; ``quick``: those, and
-    each axis alone at 4 sub-frames; ``full``: all combinations of the axes at every number of sub-frames."""
+    """``none``: the scene's own settings; ``presets``: our own three; ``samples``: sub-frames; ``quick``: those, each axis alone
+    at 4 sub-frames, and the presets; ``full``: all combinations of the axes at every number of sub-frames, and the presets."""
     if sweep == "none":
         return [Candidate(technique, ())]
-    offered = [_candidate(technique, {"preset": name}) for name in presets.SHARES]
+    offered = [_candidate(technique, {"preset": name}) for name in presets.SHARES if sweep != "samples"]
     subframes = SUBFRAMES[sweep]
     default = Settings()
     limits = {path: meta for path, _, meta in walk()}
