@@ -42,7 +42,6 @@ NEEDS: dict[str, tuple[str, ...]] = {
     "world.rays": ("use_shadows",),
     "volume": ("use_volumetric",),
     "volume.anisotropy": ("volume.density",),
-    "lpv.glossy_rays": ("use_glossy",),
     "vct.shadow_cones": ("use_shadows",),
     "vct.emissive_voxels": ("use_area_lights",),
     "ssdo.occlusion": ("use_ao",),

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import blf
 import bpy
@@ -101,15 +101,13 @@ def _say(layout, text: str, icon: str = "NONE", *, active: bool = True) -> None:
         column.label(text=line, icon=icon if number == 0 else "BLANK1" if icon != "NONE" else "NONE")
 
 
-def _prop(layout, scene, path: str, text: str | None = None) -> None:
-    """A setting, greyed out while it has no effect."""
-    owner = scene.quartet
-    *groups, name = path.split(".")
-    for group in groups:
-        owner = getattr(owner, group)
-    row = layout.row()
-    row.active = in_effect(path, properties.read(scene))
-    row.prop(owner, name, **({} if text is None else {"text": text}))
+def _props(layout, scene, paths: Iterable[str]) -> None:
+    """Settings, each greyed out while it has no effect."""
+    settings = properties.read(scene)
+    for path in paths:
+        row = layout.row()
+        row.active = in_effect(path, settings)
+        row.prop(*properties.owner_of(scene, path))
 
 
 class QUARTET_PT_presets(PresetPanel, bpy.types.Panel):
@@ -150,9 +148,7 @@ class QUARTET_PT_technique(_Panel, bpy.types.Panel):
         if strength:
             _say(column, strength, "ADD")
             _say(column, weakness, "REMOVE")
-        for name in _TOP:
-            if name not in _ELSEWHERE:
-                _prop(column, context.scene, name)
+        _props(column, context.scene, [name for name in _TOP if name not in _ELSEWHERE])
 
 
 class QUARTET_PT_sampling(_Panel, bpy.types.Panel):
@@ -221,8 +217,7 @@ class QUARTET_PT_film(_Panel, bpy.types.Panel):
     def draw(self, context):
         column = self._column()
         column.prop(context.scene.render, "film_transparent", text="Transparent")
-        for name in _FILM:
-            _prop(column, context.scene, name)
+        _props(column, context.scene, _FILM)
 
 
 class _GroupPanel(_Panel):
@@ -237,8 +232,8 @@ class _GroupPanel(_Panel):
 
     def draw(self, context):
         column = self._column()
-        for field in dataclasses.fields(getattr(Settings(), self.group)):
-            _prop(column, context.scene, f"{self.group}.{field.name}")
+        fields = dataclasses.fields(getattr(Settings(), self.group))
+        _props(column, context.scene, [f"{self.group}.{field.name}" for field in fields])
 
 
 def _group_label(name: str) -> str:

@@ -18,6 +18,14 @@ from gi_addon.settings import Settings
 
 SQUARES = ((0.02, 0.02, 0.02), (0.18, 0.18, 0.18), (0.5, 0.1, 0.05), (0.7, 0.7, 0.7), (3.0, 2.0, 0.5), (8.0, 8.0, 8.0))
 
+# How a session ends: the extension off, and the answer.
+_END = """
+    gi_addon.unregister()
+    yield 0.3
+    out["unregistered"] = len(viewport.viewports())
+    report(**out)
+"""
+
 # One session does what a user does in ten minutes; each test looks at one part of its report.
 _SESSION = """
 def steps():
@@ -139,11 +147,7 @@ def steps():
     yield 0.3
     yield settled
     out["default cube"] = len(viewport.viewports()[0]._scene.instances)
-    gi_addon.unregister()
-    yield 0.3
-    out["unregistered"] = len(viewport.viewports())
-    report(**out)
-"""
+""" + _END
 
 # What users do without waiting for the picture: each of these comes while the GL thread is at work for the viewport.
 _HASTE = """
@@ -236,11 +240,7 @@ def steps():
     yield picture
     out["undone"] = dict(state(), instances=instances(),
         top=[float(v._scene.bounds()[1][2]) for v in viewport.viewports()])
-    gi_addon.unregister()
-    yield 0.3
-    out["unregistered"] = len(viewport.viewports())
-    report(**out)
-"""
+""" + _END
 
 # Changes and undos by the hundred; resident memory of Blender and bytes and objects on the GPU on the way.
 _MEMORY = """

@@ -124,23 +124,24 @@ def unregister() -> None:
     _classes.clear()
 
 
+def owner_of(scene: bpy.types.Scene, path: str) -> tuple[bpy.types.PropertyGroup, str]:
+    """The group in ``scene.quartet`` that holds the setting ``path``, and its name there."""
+    owner = scene.quartet
+    *groups, name = path.split(".")
+    for group in groups:
+        owner = getattr(owner, group)
+    return owner, name
+
+
 def read(scene: bpy.types.Scene) -> Settings:
     """Settings from ``scene.quartet``."""
     settings = Settings()
     for path, _, _ in walk():
-        owner = scene.quartet
-        *groups, name = path.split(".")
-        for group in groups:
-            owner = getattr(owner, group)
-        settings.set(path, getattr(owner, name))
+        settings.set(path, getattr(*owner_of(scene, path)))
     return settings
 
 
 def write(scene: bpy.types.Scene, settings: Settings) -> None:
     """Put ``settings`` into ``scene.quartet``."""
     for path, value in settings.as_dict().items():
-        owner = scene.quartet
-        *groups, name = path.split(".")
-        for group in groups:
-            owner = getattr(owner, group)
-        setattr(owner, name, value)
+        setattr(*owner_of(scene, path), value)

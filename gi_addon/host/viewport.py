@@ -363,7 +363,7 @@ class Viewport:
 
 
 # Settings that say how many rays, points and directions a sub-frame spends; no map or grid hangs on them.
-_EFFORT = ("rsm.samples", "world.rays", "ssdo.samples", "ao.samples", "lpv.glossy_rays")
+_EFFORT = ("rsm.samples", "world.rays", "ssdo.samples", "ao.samples")
 
 
 def coarse(settings: Settings, scale: int) -> Settings:

@@ -22,9 +22,8 @@ void main()
         discard;
     }
 #if LAYER > 1
-    // By more than rounding: the layer before is drawn by another program.
     float before = texelFetch(PLANES_BEFORE, ivec2(gl_FragCoord.xy), 0).x;
-    if (before <= 0.5 * NOTHING || depth <= depth_of_nearness(before) * 1.00001) {
+    if (before <= 0.5 * NOTHING || depth <= depth_of_nearness(before) * BEHIND) {
         discard;
     }
 #endif

@@ -19,3 +19,7 @@
 #define PLANES ssdo_planes
 #define SENT_LIGHT ssdo_sent
 #endif
+
+// A depth this many times that of the layer before lies behind it: 80 units in the last place of a 32-bit float, by which two
+// programs that draw one surface do not differ.
+const float BEHIND = 1.00001;
