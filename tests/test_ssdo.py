@@ -535,8 +535,8 @@ def test_a_mirror_shows_the_wall_down_to_its_foot(gl):
 
 
 def test_a_mirrored_sheet_is_as_wide_as_it_is(gl):
-    """Rays that run along a sheet's edge pass behind it, as near as they do: what a mirror floor shows of two narrow sheets has the
-    exact picture's area, 3 %."""
+    """Rays that run along a sheet's edge pass behind it, as near as they do: what a mirror floor shows of two narrow sheets has
+    the area of the exact picture, 3 %."""
     b = scenes.SceneBuilder()
     b.quads(FLOOR[None], scenes.principled(Metallic=1.0, Roughness=0.0, Base_Color=(1, 1, 1, 1)))
     sheets = [np.array([-0.9, 0.5, 0.0]), np.array([0.6, 0.7, 0.0])]
