@@ -2,20 +2,10 @@
 // where it does not.
 
 #include "engines/ssdo/gather_lib.glsl"
+#include "engines/ssdo/gathered_lib.glsl"
 #if HAS_LOW_INDIRECT
 #include "passes/interpolate.glsl"
 #endif
-
-void set_light(vec3 radiance)
-{
-#if TARGET == TARGET_INDIRECT
-    indirect_diffuse = vec4(radiance, 1.0);
-#elif TARGET == TARGET_BOUNCE
-    last_bounce = vec4(radiance, 1.0);
-#else
-    screen_light = vec4(radiance, 1.0);
-#endif
-}
 
 void main()
 {
@@ -23,7 +13,7 @@ void main()
     vec2 uv = gl_FragCoord.xy * view.inverse_resolution;
     float depth = texelFetch(gbuf_depth, pixel, 0).r;
     if (depth <= 0.0 || !receives(pixel, 0)) {
-        set_light(vec3(0.0));
+        rough_light = vec4(vec3(0.0), NOT_WANTED);
         return;
     }
     vec3 position_ws = position_ws_from_depth(uv, depth);
@@ -40,5 +30,5 @@ void main()
         ivec2 place = pixel + view.pixel_offset + (ivec2(view.subframe) >> ivec2(0, 1));
         radiance = gather_screen(position_ws, n, ng, view_direction_ws(uv), place).radiance;
     }
-    set_light(radiance);
+    rough_light = vec4(radiance, found ? INTERPOLATED : GATHERED);
 }
