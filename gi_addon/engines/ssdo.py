@@ -101,8 +101,17 @@ def _layer(layer: int) -> list[Pass]:
 # What a gather takes, and what it makes (gather_lib.glsl, lighting_frag.glsl).
 _SENT = {"SENT_NOTHING": 0, "SENT_BOUNCE": 1, "SENT_EMISSION": 2}
 _TARGET = {"TARGET_INDIRECT": 0, "TARGET_BOUNCE": 1, "TARGET_SCREEN_LIGHT": 2}
-# What is lit, by the resource that it is kept in: its name in _TARGET, and in shaders.
-_KEPT_IN = {"indirect.diffuse": ("TARGET_INDIRECT", "indirect_diffuse"), "screen.light": ("TARGET_SCREEN_LIGHT", "screen_light")}
+_LIT = {
+    "TARGET_INDIRECT": Texture("indirect.diffuse", "indirect_diffuse", LIGHT, "rgba32f", _screen),
+    "TARGET_BOUNCE": Texture("ssdo.bounce", "last_bounce", LIGHT, "rgba32f", _screen),  # of each bounce but the last
+    "TARGET_SCREEN_LIGHT": Texture("screen.light", "screen_light", LIGHT, "rgba32f", _screen),
+}
+
+
+def _target(resource: str) -> str:
+    """The key of _LIT that a resource's light is of."""
+    return next((kind for kind, lit in _LIT.items() if lit.name == resource), "TARGET_BOUNCE")
+
 
 
 def _no_bounce(facts: Facts) -> str | None:
@@ -313,8 +322,13 @@ class IndirectLighting(_Gather):
             *self.behind(layers_behind),
         )  # fmt: skip
         self.last = target == "indirect.diffuse"
-        kind = "0 where none is wanted, 1 interpolated, 2 gathered here"
-        self.writes = (Texture(f"{target}.rough", "rough_light", f"{LIGHT}; {kind}", "rgba32f", _screen, scratch=True),)
+        self.target = _target(target)
+        rough = replace(_LIT[self.target], name=f"{target}.rough", glsl="rough_light", scratch=True,
+                        doc=f"{LIGHT}; 0 where none is wanted, 1 interpolated, 2 gathered here")  # fmt: skip
+        self.writes = (replace(_LIT[self.target], name=target) if self.target == "TARGET_BOUNCE" else rough,)
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return {**super().defines(facts), **_TARGET, "TARGET": _TARGET[self.target]}
 
 
 class PixelSmoothing(ScreenPass):
@@ -326,15 +340,16 @@ class PixelSmoothing(ScreenPass):
     def __init__(self, sent: str, target: str) -> None:
         self.title = f"{_title(sent)} (smoothing of pixels)"
         self.reads = (f"{target}.rough", "gbuffer.depth", "gbuffer.normal")
-        self.target, glsl = _KEPT_IN.get(target, ("TARGET_BOUNCE", "last_bounce"))
-        self.writes = (Texture(target, glsl, LIGHT, "rgba32f", _screen),)
+        self.target = _target(target)
+        self.writes = (_LIT[self.target],)
 
     def defines(self, facts: Facts) -> dict[str, int]:
         return {**_TARGET, "TARGET": _TARGET[self.target]}
 
 
 def _lighting(sent: str, low: str, target: str, layers_behind: Sequence[int] = ()) -> list[Pass]:
-    return [IndirectLighting(sent, low, target, layers_behind), PixelSmoothing(sent, target)]
+    smoothing = [PixelSmoothing(sent, target)] if _target(target) != "TARGET_BOUNCE" else []
+    return [IndirectLighting(sent, low, target, layers_behind), *smoothing]
 
 
 def _shaded_screen_wanted(facts: Facts) -> bool:

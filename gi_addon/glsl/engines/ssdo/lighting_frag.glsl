@@ -7,13 +7,19 @@
 #include "passes/interpolate.glsl"
 #endif
 
+#if TARGET == TARGET_BOUNCE
+#define LIGHT last_bounce
+#else
+#define LIGHT rough_light
+#endif
+
 void main()
 {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
     vec2 uv = gl_FragCoord.xy * view.inverse_resolution;
     float depth = texelFetch(gbuf_depth, pixel, 0).r;
     if (depth <= 0.0 || !receives(pixel, 0)) {
-        rough_light = vec4(vec3(0.0), NOT_WANTED);
+        LIGHT = vec4(vec3(0.0), NOT_WANTED);
         return;
     }
     vec3 position_ws = position_ws_from_depth(uv, depth);
@@ -23,12 +29,14 @@ void main()
     vec3 radiance = vec3(0.0);
     bool found = false;
 #if HAS_LOW_INDIRECT
-    found = interpolated_indirect(position_ws, n, ng, depth, radiance);
+    // What is only sent on is averaged over whole surfaces: near an edge the blocks of one side will do.
+    int blocks = interpolated_blocks(position_ws, n, ng, depth, radiance);
+    found = blocks == 4 || TARGET == TARGET_BOUNCE && blocks > 0;
 #endif
     if (!found) {
         // No neighbour adds its slices here: each sub-frame takes those of the next.
         ivec2 place = pixel + view.pixel_offset + (ivec2(view.subframe) >> ivec2(0, 1));
         radiance = gather_screen(position_ws, n, ng, view_direction_ws(uv), place).radiance;
     }
-    rough_light = vec4(radiance, found ? INTERPOLATED : GATHERED);
+    LIGHT = vec4(radiance, found ? INTERPOLATED : GATHERED);
 }

@@ -9,8 +9,6 @@
 
 #if TARGET == TARGET_INDIRECT
 #define TARGET_LIGHT indirect_diffuse
-#elif TARGET == TARGET_BOUNCE
-#define TARGET_LIGHT last_bounce
 #else
 #define TARGET_LIGHT screen_light
 #endif
