@@ -23,6 +23,7 @@ from ..passes.occupancy import CELL_UNIFORMS, Occupancy, set_cells
 from ..passes.reflections import GLOSSY_RAY, GLOSSY_TRACED, reflection_sharing
 from ..passes.resolve import Resolve
 from ..passes.screen import (
+    DIRECTION,
     INDIRECT_DIFFUSE,
     LOBE,
     REFRACTING,
@@ -267,7 +268,8 @@ class InterpolatedIndirect(ScreenPass):
     writes = (
         Texture("indirect.low", "low_indirect", "radiance a white Lambert surface would reflect, W/(m²·sr)", "rgba32f",
                 gather_size, scratch=True),
-        Texture("indirect.low_direction", "low_direction", "Σ luminance × direction, and Σ luminance, of what arrives",
+        Texture("indirect.low_direction", "low_direction", DIRECTION, "rgba32f", gather_size, scratch=True),
+        Texture("indirect.low_slope", "low_slope", "gradient of that radiance over the position, over the radiance, 1/m",
                 "rgba32f", gather_size, scratch=True),
     )  # fmt: skip
     uniforms = (Uniform("vpl_count", "int", "virtual point lights in the list"), *CELL_UNIFORMS, *MEDIUM_UNIFORMS)
@@ -296,7 +298,7 @@ class IndirectLighting(ScreenPass):
     reads = (
         "vpls", "rsm.lights", "gbuffer.depth", "gbuffer.normal", Optional("gbuffer.low_depth"),
         Optional("gbuffer.low_normal"), Optional("gbuffer.low_pixel"), Optional("indirect.low"),
-        Optional("indirect.low_direction"), Optional("ao"),
+        Optional("indirect.low_direction"), Optional("indirect.low_slope"), Optional("ao"),
     )  # fmt: skip
     writes = (INDIRECT_DIFFUSE,)
     uniforms = (Uniform("vpl_count", "int", "virtual point lights in the list"), *CELL_UNIFORMS, *MEDIUM_UNIFORMS)
