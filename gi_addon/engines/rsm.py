@@ -240,7 +240,7 @@ class RSMImportance(Pass):
     def run(self, frame: Frame, planned: Planned) -> bool:
         facts, blocks = planned.facts, _block_count(planned.facts)
         views, lights = len(facts.rig.bounce.sizes), len(facts.rig.sources)
-        if frame.subframe == 0:
+        if frame.subframe == 0 or planned.stale:
             # Kept for the others: their samples are one even set only if all are drawn alike.
             program = frame.program(planned)
             set_medium(frame, program, facts)
