@@ -232,7 +232,7 @@ class RSMImportance(Pass):
         self.reads = _tested(type(self).reads, settings)
 
     def absent(self, facts: Facts) -> str | None:
-        return "lights are to add up exactly: each draws by its own flux" if facts.settings.rsm.own_samples else None
+        return _adds_up(facts)
 
     def defines(self, facts: Facts) -> dict[str, int]:
         return {**_gather_defines(facts), "BLOCK_LEVEL": _block_level(facts), "RECEIVERS": _RECEIVERS}
@@ -240,8 +240,11 @@ class RSMImportance(Pass):
     def run(self, frame: Frame, planned: Planned) -> bool:
         facts, blocks = planned.facts, _block_count(planned.facts)
         views, lights = len(facts.rig.bounce.sizes), len(facts.rig.sources)
-        if frame.subframe == 0 or planned.stale:
-            # Kept for the others: their samples are one even set only if all are drawn alike.
+        # The first sub-frame's serves the others, whose samples are one even set only if all are drawn alike, and every picture of
+        # the same: of whatever the first sub-frame hangs on.
+        seen = (facts.stamps, facts.resolution, facts.subframes, facts.settings.as_dict())
+        if planned.stale or (frame.subframe == 0 and planned.memory.get("seen") != seen):
+            planned.memory["seen"] = seen
             program = frame.program(planned)
             set_medium(frame, program, facts)
             set_cells(frame, program, facts)
@@ -353,6 +356,11 @@ def _tested(reads: tuple, settings: Settings) -> tuple:
     return reads if settings.rsm.visibility == "NONE" else (Optional("occupancy"), *reads)
 
 
+def _adds_up(facts: Facts) -> str | None:
+    """Why a light's virtual lights must not hang on what other lights send, or None."""
+    return "lights are to add up exactly, each with what is its own" if facts.settings.rsm.own_samples else None
+
+
 class InterpolatedIndirect(ScreenPass):
     """Indirect irradiance at one pixel per block."""
 
@@ -364,7 +372,7 @@ class InterpolatedIndirect(ScreenPass):
                 gather_size, scratch=True),
         Texture("indirect.low_direction", "low_direction", DIRECTION, "rgba32f", gather_size, scratch=True),
         Texture("indirect.low_slope", "low_slope", "gradient of that radiance over the position, over the radiance, 1/m",
-                "rgba32f", gather_size, scratch=True),
+                "rgba32f", gather_size, scratch=True, when=_adds_up),
     )  # fmt: skip
     uniforms = (Uniform("vpl_count", "int", "virtual point lights in the list"), *CELL_UNIFORMS, *MEDIUM_UNIFORMS)
     fragment = "engines/rsm/gather_low_frag.glsl"

@@ -13,6 +13,10 @@
 
 #include "passes/gather_receiver.glsl"
 
+#ifndef HAS_LOW_SLOPE
+#define HAS_LOW_SLOPE 0 // not known here
+#endif
+
 float linear_irradiance(vec4 direction, vec3 n) { return max(0.25 * direction.w + 0.5 * dot(direction.xyz, n), 0.0); }
 
 // False where a neighbour is of another surface: gather afresh. With one missing, light that falls off towards an edge would be
@@ -48,7 +52,7 @@ bool interpolated_indirect(vec3 position_ws, vec3 n, vec3 ng, float depth, out v
         float from = linear_irradiance(direction, others[k].n);
         // Turning may dim to nothing, and brighten by the two-fold at most that 25° can make of an even sky.
         float turn = from > 0.0 ? min(linear_irradiance(direction, n) / from, 2.0) : 1.0;
-#ifdef HAS_LOW_SLOPE
+#if HAS_LOW_SLOPE
         // What changes by more than itself across half a block is no straight line, but never below nothing.
         vec3 back = 2.0 * position_ws - others[k].position_ws - middle_ws; // −(d_k + d)
         turn *= 1.0 + clamp(0.5 * dot(texelFetch(low_slope, block, 0).xyz, back), -1.0, 1.0);

@@ -10,7 +10,7 @@
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
-const float DEFENSIVE_SHARE = 0.25;
+const float DEFENSIVE_SHARE = 0.5;
 
 void main()
 {
