@@ -205,8 +205,8 @@ class RSMImportance(Pass):
     writes = (
         Texture("rsm.importance", "rsm_importance", "chance of the block of RSM texels to hold a virtual light", "r32f",
                 _block_count, mips=lambda f: max(_block_count(f)).bit_length() - 1),
-        Buffer("rsm.importance.blocks", "importance", "mean share in a receiver's light of what a block sends it, over its flux, 1/W",
-               "float", np.dtype("f4"), lambda f: int(np.prod(_block_count(f))), scratch=True),
+        Buffer("rsm.importance.blocks", "importance", "share of a block in what receivers get, over its flux, 1/W", "float",
+               np.dtype("f4"), lambda f: int(np.prod(_block_count(f))), scratch=True),
         Buffer("rsm.importance.sent", "importance_sent", "what each block sends to each receiver, W", "float", np.dtype("f4"),
                lambda f: int(np.prod(_block_count(f))) * _RECEIVERS, scratch=True),
         Buffer("rsm.importance.total", "importance_total", "what each light's blocks send to each receiver, W", "float",
@@ -240,8 +240,8 @@ class RSMImportance(Pass):
     def run(self, frame: Frame, planned: Planned) -> bool:
         facts, blocks = planned.facts, _block_count(planned.facts)
         views, lights = len(facts.rig.bounce.sizes), len(facts.rig.sources)
-        # The first sub-frame's serves the others, whose samples are one even set only if all are drawn alike, and every picture of
-        # the same: of whatever the first sub-frame hangs on.
+        # The first sub-frame's serves the others, whose samples are one even set only if all are drawn alike; and other pictures
+        # of the same, whatever it hangs on.
         seen = (facts.stamps, facts.resolution, facts.subframes, facts.settings.as_dict())
         if planned.stale or (frame.subframe == 0 and planned.memory.get("seen") != seen):
             planned.memory["seen"] = seen
