@@ -307,7 +307,7 @@ class Renderer:
             "World Map",
             {"compute": "passes/world_map_comp.glsl"},
             prelude={"compute": "layout(binding = 0, rgba32f) writeonly uniform image2D world_map;"},
-            virtual={**GENERATED, "generated/world.glsl": world_source(world, 0, sun_disc=False)},
+            virtual={**GENERATED, "generated/world.glsl": world_source(world, 0, camera=False, sun_disc=False)},
         )
         texture = self.gl.texture("world map", _WORLD_MAP, "rgba32f")
         # Image look-ups take their level of detail from the view.

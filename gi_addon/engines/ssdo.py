@@ -461,7 +461,7 @@ def _world(frame: Frame, planned: Planned, wanted: bool) -> Iterator[dict[str, s
         return
     frame.gpu.bind_world_params()
     frame.gpu.bind_images(frame.gpu.world, units)
-    yield {"generated/world.glsl": world_source(frame.gpu.world, units)}
+    yield {"generated/world.glsl": world_source(frame.gpu.world, units, camera=False)}
     frame.gpu.unbind_images(units, len(frame.gpu.world.images))
 
 
