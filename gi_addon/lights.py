@@ -284,6 +284,7 @@ class LightRig:
             self._place_on_mesh(out, source, u, subframes)
             return
         out["diffuse"], out["glossy"] = light.visible_diffuse, light.visible_glossy
+        out["falloff"], out["falloff_smooth"] = light.falloff, light.falloff_smooth
         out["receivers"] = light.receivers
         matrix = light.matrix
         center = matrix[:3, 3]

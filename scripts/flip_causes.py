@@ -3,11 +3,11 @@
 
 ``python scripts/flip_causes.py SCENE.blend --technique RSM --set samples=4 --also "samples=16" --also "bounces=6"``
 
-Combined is light × colour summed over the parts, so each part can be exchanged alone. ``theirs`` is the FLIP that is left when
-Cycles' part stands in for ours: low where that part is the cause. ``ours alone`` is the FLIP of Cycles' picture with that part
-ours: what the part costs by itself. ``R1 for R∞`` is the indirect light of one bounce in Cycles' own picture: what any method of one bounce
-lacks. ``--also`` renders once more with other settings. References are the ready ones where there are any (scripts/score_shared.py),
-else Cycles renders R1 and R∞ here, kept in ``--references``.
+Combined is light × colour summed over the parts, so each part can be exchanged alone. ``theirs`` is the FLIP that is left
+when Cycles' part stands in for ours: low where that part is the cause. ``ours alone`` is the FLIP of Cycles' picture with
+that part ours: what the part costs by itself. ``R1 for R∞`` exchanges the indirect light for Cycles' own of one bounce: alone,
+it is what any method of one bounce lacks. ``--also`` renders once more with other settings. References are the ready ones
+where there are any (scripts/score_shared.py), else Cycles renders R1 and R∞ here, kept in ``--references``.
 """
 
 from __future__ import annotations
@@ -88,7 +88,6 @@ def split(ours: dict[str, np.ndarray], cycles: dict[str, dict[str, np.ndarray]])
 
 
 def main() -> None:
-    import bpy
 
     import gi_addon
     from gi_addon.host import files, properties
@@ -97,7 +96,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("scene", type=Path)
     parser.add_argument("--technique", default="RSM", help="one, or several with commas between")
-    parser.add_argument("--set", action="append", default=["samples=4"], help="a setting, as 'bounces=4'; 4 sub-frames unless said")
+    parser.add_argument("--set", action="append", default=["samples=4"], help="a setting; samples=4 unless said")
     parser.add_argument("--also", action="append", default=[], help="further settings, with spaces between, for one more picture")
     parser.add_argument("--references", type=Path, default=Path("references"), help="folder of Cycles' pictures")
     parser.add_argument("--cycles-samples", type=int, default=256)

@@ -193,7 +193,7 @@ class _Walk:
         if node.kind == "BLACKBODY":
             return blackbody(self.number(get("Temperature", 1500.0), depth))
         if node.kind == "LIGHT_FALLOFF":
-            # With the distance squared as lights have it anyway; other falloffs count as that.
+            # How it falls off is the light's own (Light.falloff).
             return self.number(get("Strength", 100.0), depth)
         if node.kind == "TEX_IES":
             return float(node.params.get("mean", 0.0)) * self.number(get("Strength", 1.0), depth)

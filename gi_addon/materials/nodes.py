@@ -355,6 +355,8 @@ def uv_map(c: Compiler, n: Node) -> dict[str, Value]:
 def attribute(c: Compiler, n: Node) -> dict[str, Value]:
     """A mesh attribute by name. Those of objects, instancers and view layers are numbers, which ``value`` (4,) holds."""
     name = n.params.get("attribute_name", "")
+    if n.params.get("carried"):  # by the instance, in place of its colour
+        return _attribute("point.object_color")
     if n.params.get("attribute_type", "GEOMETRY") != "GEOMETRY":
         *rgb, alpha = n.params.get("value", (0.0, 0.0, 0.0, 0.0))
         color = c.constant(tuple(rgb), COLOR)
