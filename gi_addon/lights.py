@@ -447,10 +447,11 @@ def build_rig(
     shadow_resolution: int,
     bounce_resolution: int,
     world_resolution: int,
+    tinted: bool = False,
     texel_budget: int = 1 << 25,
 ) -> LightRig:
     """Collect what shines and lay out its maps. Lights without power, or with a broken transform, are left out with a
-    note."""
+    note. Where see-through surfaces are ``tinted`` every light has a shadow map of its own, which knows the tint."""
     sources: list[Source] = []
     notes: list[str] = []
     for index, light in enumerate(lights):
@@ -514,7 +515,7 @@ def build_rig(
         coarse = source.light is not None and coarser[source.seed] > 0
         # What the light lights but is not shaded by is in its bounce map too.
         linked = source.light is not None and source.light.blockers != EVERY_SET
-        return not (drawn_anew and bounce_resolution >= shadow_resolution and not coarse and not linked)
+        return not (drawn_anew and bounce_resolution >= shadow_resolution and not coarse and not linked and not tinted)
 
     return LightRig(
         sources, focus, world, emitters,

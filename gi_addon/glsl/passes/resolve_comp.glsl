@@ -124,7 +124,7 @@ void main()
         through_color = vec3(0.0);
     }
 #endif
-    // What is behind a medium arrives dimmed, in every pass, the colours too, as in Cycles.
+    // What is behind a medium or a coloured film arrives dimmed, in every pass, the colours too, as in Cycles.
     vec3 passes = vec3(1.0);
 #if HAS_VOLUME_LIGHT
     volume = texelFetch(volume_light, pixel, 0).rgb;
@@ -133,6 +133,9 @@ void main()
     passes = texelFetch(volume_transmittance, pixel, 0).rgb;
 #elif HAS_VOLUME_LIGHT
     passes = vec3(texelFetch(volume_light, pixel, 0).a);
+#endif
+#if HAS_GBUF_TINT
+    passes *= texelFetch(gbuf_tint, pixel, 0).rgb;
 #endif
     diffuse_color *= passes;
     through_color *= passes;
