@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from .emitters import Emitters
 from .focus import Focus, find_focus
-from .lights import Emitters, LightRig, build_rig
+from .lights import LightRig, build_rig
 from .materials import CompiledGraph, Medium, mean_medium
 from .outputs import film_layers
 from .scene import CAMERA, CATCHER, Mesh, Scene

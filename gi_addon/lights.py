@@ -9,13 +9,12 @@ own; with one sub-frame every light is its centre.
 from __future__ import annotations
 
 import zlib
-from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 
 import numpy as np
 
 from . import atlas
+from .emitters import Emitters
 from .focus import Focus
 from .gpu_types import (
     LIGHT,
@@ -33,7 +32,7 @@ from .gpu_types import (
     SHAPE_ELLIPSE,
     SHAPE_RECTANGLE,
 )
-from .scene import DIFFUSE, EVERY_SET, Light, Scene
+from .scene import EVERY_SET, Light
 from .sequence import sobol_2d
 from .world_map import WorldMap
 
@@ -54,59 +53,6 @@ _FACES = np.array([
     [[1, 0, 0], [0, 0, 1], [0, -1, 0]],
     [[1, 0, 0], [0, 1, 0], [0, 0, -1]],
 ], "f8")  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Emitters:
-    """Emissive triangles of the scene: corners (T, 3, 3) world space, radiance (T, 3) W/(m²·sr) from both sides."""
-
-    corners: np.ndarray
-    radiance: np.ndarray
-
-    @staticmethod
-    def none() -> Emitters:
-        return Emitters(np.zeros((0, 3, 3)), np.zeros((0, 3)))
-
-    @staticmethod
-    def of(scene: Scene, emission: Sequence[np.ndarray]) -> Emitters:
-        """The emissive triangles of ``scene``; ``emission`` is the mean radiance (3,) of each material. Triangles
-        without area are left out."""
-        corners, radiance = [], []
-        inst = scene.instances
-        for i in range(len(inst)):
-            mesh, used = scene.meshes[inst.mesh[i]], inst.materials[i]
-            if not inst.visibility[i] & DIFFUSE or not np.isfinite(inst.matrix[i]).all() or not used:
-                continue
-            for slot, first, count in mesh.slots:
-                value = emission[used[min(int(slot), len(used) - 1)]]
-                if count and (value > 0.0).any():
-                    triangles = mesh.positions[mesh.triangles[first : first + count]].astype("f8")
-                    corners.append(triangles @ inst.matrix[i, :3, :3].T + inst.matrix[i, :3, 3])
-                    radiance.append(np.broadcast_to(value, (count, 3)))
-        if not corners:
-            return Emitters.none()
-        found = Emitters(np.concatenate(corners), np.concatenate(radiance))
-        solid = found.areas() > 0.0
-        return Emitters(found.corners[solid], found.radiance[solid])
-
-    def __len__(self) -> int:
-        return len(self.corners)
-
-    def areas(self) -> np.ndarray:
-        """Triangle areas (T,), m²."""
-        a = self.corners[:, 1] - self.corners[:, 0]
-        b = self.corners[:, 2] - self.corners[:, 0]
-        return 0.5 * np.linalg.norm(np.cross(a, b), axis=1)
-
-    @cached_property
-    def share(self) -> np.ndarray:
-        """Each triangle's share (T,) of the luminous power, by which points are drawn."""
-        power = self.areas() * (self.radiance @ np.array([0.2126, 0.7152, 0.0722]))
-        return power / power.sum()
-
-    @cached_property
-    def cumulative(self) -> np.ndarray:
-        return np.cumsum(self.share)
 
 
 @dataclass
