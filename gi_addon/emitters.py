@@ -106,10 +106,14 @@ def _orientation(corners: np.ndarray) -> float:
     """1 or −1 where triangles (T, 3, 3) close a volume, by the sign of what they enclose; 0 where an edge is open."""
     if not 4 <= len(corners) <= _MOST_GUIDED:
         return 0.0
-    _, vertex = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
+    # Vertices in one place are one, to a rounding of 32 bits; triangles that have lost a corner by that are none.
+    points = corners.reshape(-1, 3)
+    grain = 1e-5 * float(np.ptp(points, axis=0).max()) or 1.0
+    _, vertex = np.unique(np.round((points - points.min(axis=0)) / grain), axis=0, return_inverse=True)
     vertex = vertex.reshape(-1, 3)
+    a, b, c = vertex.T
+    vertex = vertex[(a != b) & (b != c) & (c != a)]
     edges = np.concatenate([vertex[:, (0, 1)], vertex[:, (1, 2)], vertex[:, (2, 0)]])
-    edges = edges[edges[:, 0] != edges[:, 1]]
     _, forth = np.unique(edges, axis=0, return_counts=True)
     _, both = np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)
     if (forth != 1).any() or (both != 2).any():  # each edge once in either direction

@@ -245,7 +245,7 @@ def _draw_tiles(frame: Frame, planned: Planned, visibility: int, fragment: str, 
             for program in programs if full else ():
                 frame.set(program, light_reaches=reaches)
             frame.gpu.draw(planned, stages, visibility, clip_from_world, beyond=beyond, among=among, **options)
-    if full and planned.facts.tinted:
+    if planned.has("rsm.albedo") and planned.facts.tinted:
         # What reflects here was lit through them.
         albedo = [w.name for w in planned.texture_writes() if w.format != "depth24"].index("rsm.albedo")
         fbo.color_mask = tuple((k == albedo,) * 4 for k in range(len(fbo.color_attachments)))

@@ -2,15 +2,18 @@
 // are any; after shadow_lib.glsl.
 
 #if HAS_SHADOW_TINT
-// One texel's tint, for a point at `depth`: 1 for what is nearer to the light than the surfaces that tint.
-vec3 tint_texel(ivec2 texel, float depth, float width)
+// One texel's tint, for a point at `depth`, and whether light comes as far there: 1 for what is nearer to the light than the
+// surfaces that tint.
+vec4 tint_texel(ivec2 texel, float depth, float width)
 {
     vec4 tint = texelFetch(shadow_tint, texel, 0);
-    return depth > tint.a + width ? tint.rgb : vec3(1.0);
+    float lit = texelFetch(shadow_depth, texel, 0).r >= depth - width ? 1.0 : 0.0;
+    return vec4(depth > tint.a + width ? tint.rgb * lit : vec3(lit), lit);
 }
 #endif
 
-// Share of a light that what it passes on its way to a point leaves, by channel, where any arrives; bilinear over the map.
+// Share of a light that what it passes on its way to a point leaves, by channel, where any arrives: the
+// mean over the texels that show the point lit, by their nearness.
 vec3 light_tint(Light light, vec3 position_ws)
 {
 #if HAS_SHADOW_TINT
@@ -26,11 +29,17 @@ vec3 light_tint(Light light, vec3 position_ws)
             vec2 f = at - base;
             // Depths are halves: 11 bits.
             float width = light_view_texel_width(v, p.z) + p.z / 1024.0;
-            vec3 a = tint_texel(ivec2(clamp(base, low, high)), p.z, width);
-            vec3 b = tint_texel(ivec2(clamp(base + vec2(1.0, 0.0), low, high)), p.z, width);
-            vec3 c = tint_texel(ivec2(clamp(base + vec2(0.0, 1.0), low, high)), p.z, width);
-            vec3 d = tint_texel(ivec2(clamp(base + 1.0, low, high)), p.z, width);
-            return mix(mix(a, b, f.x), mix(c, d, f.x), f.y);
+            // All four texels around the point may show the share of a film that stops the light: the next ones tell then,
+            // by a weight that is nothing beside those of the four.
+            vec4 sum = vec4(0.0);
+            for (int y = -1; y <= 2; ++y) {
+                for (int x = -1; x <= 2; ++x) {
+                    vec2 near = max(1.0 - abs(vec2(x, y) - f), 1e-3);
+                    vec4 texel = tint_texel(ivec2(clamp(base + vec2(x, y), low, high)), p.z, width);
+                    sum += texel * (near.x * near.y);
+                }
+            }
+            return sum.a > 0.0 ? sum.rgb / sum.a : vec3(1.0);
         }
     }
 #endif
