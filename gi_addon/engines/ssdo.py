@@ -48,7 +48,7 @@ from ..settings import Settings
 
 def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
     """Figure 4d, in order; each further bounce repeats the gather."""
-    layers_behind = range(2, settings.ssdo.layers + 1) if settings.use_indirect_diffuse else ()
+    layers_behind = range(2, settings.ssdo.layers + 1)
     bounces = []
     for bounce in range(1, settings.bounces + 1):
         last = bounce == settings.bounces
@@ -111,6 +111,11 @@ def _no_bounce(facts: Facts) -> str | None:
     return "no visible material is diffuse" if not facts.diffuse else None
 
 
+def _no_rays(facts: Facts) -> str | None:
+    """Why nothing looks behind what the camera sees, or None."""
+    return _no_bounce(facts) and no_gloss(facts) and "nothing is gathered or mirrored"
+
+
 class ScreenPlanes(ScreenPass):
     """The depth buffer in a form in which planes and rays are linear."""
 
@@ -158,7 +163,7 @@ class Layer(GBuffer):
         return {"LAYER": self.layer, **{n: v for n, v in left_out.items() if n not in _present(self)}}
 
     def absent(self, facts: Facts) -> str | None:
-        return super().absent(facts) or _no_bounce(facts)
+        return super().absent(facts) or _no_rays(facts)
 
 
 def _present(task: Pass) -> set[str]:
@@ -197,14 +202,14 @@ class SentLight(ScreenPass):
             Optional(_of_layer("gbuffer.specular", layer)), Optional(_of_layer("gbuffer.lobe", layer)),
             Optional("brdf.average"), Optional("brdf.energy"), *before,
         )  # fmt: skip
-        name, glsl = (f"ssdo.sent.{bounce}", "ssdo_sent") if layer == 1 else (f"ssdo.layer{layer}.sent", f"ssdo_sent_{layer}")
+        name, glsl = (f"ssdo.sent.{bounce}", "ssdo_sent") if layer == 1 else [f"ssdo{c}layer{layer}{c}sent" for c in "._"]
         self.writes = (Texture(name, glsl, "radiance that leaves the surface, W/(m²·sr)", "rgba32f", _screen),)
 
     def defines(self, facts: Facts) -> dict[str, int]:
         return {"LAYER": self.layer, **({} if self.bounce > 1 else {"HAS_LAST_BOUNCE": 0})}
 
     def absent(self, facts: Facts) -> str | None:
-        return _no_bounce(facts)
+        return _no_bounce(facts) if self.layer == 1 else _no_rays(facts)
 
 
 _BOX = Uniform("ssdo_box", "vec4", "the rectangle of the screen that the scene's box covers: low x, y, high x, y, pixels")
@@ -417,13 +422,16 @@ REFLECTED_SOURCES = Texture("reflected.sources", "reflected_sources", "radiance 
                             "of emissive pixels, W/(m²·sr)", "rgba32f", _screen)  # fmt: skip
 
 
+# What a ray through the depth buffer is traced in, and the light that it finds (trace_lib.glsl).
+_TRACED = ("ssdo.planes", "ssdo.pyramid", "ssdo.shaded", Optional(_planes(2)), Optional("ssdo.layer2.sent"))
+
+
 class Reflections(Pass):
     """Glossy reflections of the screen."""
 
     title = "SSDO Reflections"
     reads = (
-        "ssdo.planes", "ssdo.pyramid", "ssdo.shaded", "gbuffer.depth", "gbuffer.normal", *LOBE,
-        Optional("gbuffer.emission", ("sources.traced",)),
+        *_TRACED, "gbuffer.depth", "gbuffer.normal", *LOBE, Optional("gbuffer.emission", ("sources.traced",)),
     )  # fmt: skip
     writes = (
         GLOSSY_TRACED, SOURCES_TRACED, GLOSSY_RAY,
@@ -499,8 +507,7 @@ class Refraction(Pass):
     title = "SSDO Refraction"
     figure = "Lighting Computation"
     reads = (
-        "ssdo.planes", "ssdo.pyramid", "ssdo.shaded", *REFRACTING,
-        Optional("gbuffer.emission"),
+        *_TRACED, *REFRACTING, Optional("gbuffer.emission"),
     )  # fmt: skip
     writes = (TRANSMISSION_INDIRECT,)
     uniforms = Reflections.uniforms
