@@ -65,9 +65,8 @@ void main()
     vec3 flux = imageLoad(lpv_radiance, volume_texel(cell, ordinate)).rgb;
 #endif
     float whole = share.x + share.y + share.z;
-    vec3 kept = vec3(1.0);
-#if HAS_MEDIUM
-    kept = exp(-medium_extinction * (grid_cell / whole)); // a straight way crosses |ω|₁/h faces per metre
+#if HAS_LPV_AIR
+    vec3 here = texelFetch(lpv_air, volume_texel(cell, 0), 0).rgb;
 #endif
     float behind = whole;
     float ahead = whole;
@@ -94,7 +93,11 @@ void main()
 #if LPV_LIMITED
             neighbour *= float(wave > 0); // before the first iteration a cell has only what it emits
 #endif
-            flux += (share[axis] * (1.0 - coverage) * neighbour.a) * neighbour.rgb * kept;
+#if HAS_LPV_AIR
+            // A straight way crosses |ω|₁/h faces per metre, half of it on either side of each.
+            neighbour.rgb *= exp((here + texelFetch(lpv_air, volume_texel(from, 0), 0).rgb) * (-0.5 * grid_cell / whole));
+#endif
+            flux += (share[axis] * (1.0 - coverage) * neighbour.a) * neighbour.rgb;
         }
 #if HAS_LPV_WALLS
         if (local[axis] < grid_size[axis] - 1) {
