@@ -8,6 +8,7 @@ the scene's geometry, and looked up at each pixel.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import permutations, product
 
 import moderngl
@@ -102,12 +103,24 @@ def grid_count(facts: Facts) -> int:
     chosen = facts.settings.lpv
     if chosen.iterations:
         return 1
-    return grids_needed(facts.focus, chosen.resolution) if chosen.cascades == "AUTO" else int(chosen.cascades)
+    if chosen.cascades != "AUTO":
+        return int(chosen.cascades)
+    return min(grids_needed(facts.focus, chosen.resolution) + int(_endless(facts)), MOST_GRIDS)
+
+
+def _endless(facts: Facts) -> bool:
+    """Whether air that scatters goes on outside of the scene."""
+    return any(domain.unit_from_world is None and max(domain.medium.scattering) > 0.0 for domain in air(facts))
 
 
 def grids(facts: Facts) -> list[Grid]:
     """The frame's grids, the outermost first."""
-    return nested_grids(facts.focus, facts.settings.lpv.resolution, grid_count(facts), facts.eye)
+    focus = facts.focus
+    if _endless(facts) and grid_count(facts) > 1:
+        # One more around all, of cells twice as wide and as many of them: what the scene sends out lights the air before it.
+        margin = 0.5 * float((focus.region[1] - focus.region[0]).max())
+        focus = replace(focus, region=focus.region + margin * np.array([[-1.0], [1.0]]))
+    return nested_grids(focus, facts.settings.lpv.resolution, grid_count(facts), facts.eye)
 
 
 def grid(facts: Facts) -> Grid:
