@@ -398,7 +398,7 @@ class GeometryInjection(Pass):
                "vec4", np.dtype(("f4", (4,))), lambda f: _cells(f) * 3),
         Buffer("lpv.faces", "lpv_faces", "per cell and axis: covered points, fragments, sums of their places and normals",
                "uint", np.dtype("u4"), lambda f: _most_cells(f) * 15, scratch=True),
-        Buffer("lpv.albedo", "lpv_albedo", "per cell and axis: mean of albedo over |n|₁ (a float's bits), red, green, blue",
+        Buffer("lpv.albedo", "lpv_albedo", "per cell and axis: mean of albedo (a float's bits), red, green, blue",
                "uint", np.dtype("u4"), lambda f: _cells(f) * 9,
                when=_no_albedo),
         Texture("lpv.raster", "lpv_raster", "what the surfaces are drawn to; nobody reads it", "r8",
@@ -514,6 +514,8 @@ class Propagation(Pass):
             self.writes += (
                 Texture("lpv.bounced", "lpv_bounced", "lpv.source and what the walls reflect of the volume's light", "rgba32f",
                         _sh_size, access="readwrite", scratch=True),
+                Texture("lpv.absorbed", "lpv_absorbed", "flux that ends at the walls of each cell, over h², W/m²", "rgba32f",
+                        lambda f: _size(f, 1), access="readwrite", scratch=True),
                 Buffer("lpv.reflected", "lpv_reflected", "what the walls reflect in fixed point: cell, harmonic, colour", "int",
                        np.dtype("i4"), lambda f: _most_cells(f) * SH_COUNT * 3, scratch=True),
             )  # fmt: skip
@@ -531,7 +533,8 @@ class Propagation(Pass):
 
     def defines(self, facts: Facts) -> dict[str, int]:
         return {
-            "HAS_LPV_BOUNCED": int(facts.settings.bounces > 1), "LPV_LIMITED": int(facts.settings.lpv.iterations > 0),
+            "HAS_LPV_BOUNCED": int(facts.settings.bounces > 1), "HAS_LPV_ABSORBED": int(facts.settings.bounces > 1),
+            "LPV_LIMITED": int(facts.settings.lpv.iterations > 0),
             **_defines(facts),
         }  # fmt: skip
 
