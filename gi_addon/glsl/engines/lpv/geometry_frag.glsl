@@ -50,7 +50,7 @@ void main()
 #endif
     vec3 share = saturate(albedo / max(opacity, 1e-4));
     for (int k = 0; k < 3; ++k) {
-        atomicAdd(lpv_albedo[face_index(cell, axis) * 3 + k], uint(share[k] * 255.0 + 0.5));
+        atomicAdd(lpv_albedo[face_index(cell, axis) * 3 + k], uint(share[k] * LPV_ALBEDO_UNITS));
     }
 #endif
 }

@@ -8,6 +8,9 @@
 
 #include "engines/lpv/lpv_lib.glsl"
 
+// Albedos are summed in whole units and never rounded up: no bounce has more than the albedo. 2²⁰ fragments a face fit.
+const float LPV_ALBEDO_UNITS = 4095.0;
+
 // The face below `cell` along `axis`; the first layer's are never asked for.
 int face_index(ivec3 cell, int axis) { return (grid_first + cell_index(cell, grid_size)) * 3 + axis; }
 

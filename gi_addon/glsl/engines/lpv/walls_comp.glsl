@@ -62,7 +62,7 @@ void main()
 #if HAS_LPV_ALBEDO
         for (int k = 0; k < 3; ++k) {
             // From the sums to their mean, as a float in the same word.
-            lpv_albedo[face * 3 + k] = floatBitsToUint(float(lpv_albedo[face * 3 + k]) / (255.0 * float(max(count, 1u))));
+            lpv_albedo[face * 3 + k] = floatBitsToUint(float(lpv_albedo[face * 3 + k]) / (LPV_ALBEDO_UNITS * float(max(count, 1u))));
         }
 #endif
         lpv_walls[face] = vec4(blocked, mean.x, 2.0 * mean.yz - 1.0);
