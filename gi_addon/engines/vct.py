@@ -16,7 +16,7 @@ from ..graph import Optional, Pass, Planned, Texture, Uniform
 from ..lights import Source, spread_profile
 from ..passes.brdf_tables import BRDFTables
 from ..passes.direct_lighting import DirectLighting, TranslucentLighting
-from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint, gather_size
+from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint, gather_scale, gather_size
 from ..passes.lights import LightList, RSMGeneration, ShadowMaps
 from ..passes.occupancy import Occupancy
 from ..passes.reflections import GLOSSY_RAY, GLOSSY_TRACED, reflection_sharing
@@ -241,7 +241,7 @@ _BLOCKS = ("gbuffer.low_depth", "gbuffer.low_normal", "gbuffer.low_pixel")
 
 
 def _hits_defines(facts: Facts) -> dict[str, int]:
-    return {"GATHER_SCALE": facts.settings.gather_scale, "CONES": facts.settings.vct.cones}
+    return {"GATHER_SCALE": gather_scale(facts), "CONES": facts.settings.vct.cones}
 
 
 class ConeHits(Pass):
