@@ -36,6 +36,23 @@ def shot(path):
 def view():
     area = next(a for a in bpy.context.window_manager.windows[0].screen.areas if a.type == "VIEW_3D")
     return area, area.spaces.active, next(r for r in area.regions if r.type == "WINDOW")
+def here():
+    area, _, region = view()
+    return bpy.context.temp_override(window=bpy.context.window_manager.windows[0], area=area, region=region)
+def second_view():
+    # Another viewport beside the first, rendered too.
+    with here():
+        bpy.ops.screen.area_split(direction="VERTICAL", factor=0.5)
+    for a in bpy.context.window_manager.windows[0].screen.areas:
+        if a.type == "VIEW_3D":
+            a.spaces.active.shading.type = "RENDERED"
+def final_render(samples):
+    # Start a small final render; the list has something in it when it has ended.
+    ended, scene = [], bpy.context.scene
+    bpy.app.handlers.render_complete.append(lambda *_: ended.append(True))
+    scene.render.resolution_x, scene.render.resolution_y, scene.quartet.samples = 160, 90, samples
+    bpy.ops.render.render("INVOKE_DEFAULT")
+    return ended
 def studio():
     # A red and a white box on a floor under a spot, in the default file; the camera looks at them.
     from mathutils import Vector

@@ -136,8 +136,6 @@ def steps():
     window = manager.windows[0]
     settings = manager.quartet
     settings.reference_samples, settings.compare_percentage = 100000, 50
-    def here():
-        return bpy.context.temp_override(window=window, area=area, region=region)
     with here():
         bpy.ops.quartet.compare("INVOKE_DEFAULT")
     def under_way():

@@ -9,6 +9,7 @@ from conftest import make
 from gpu import evaluate
 
 from gi_addon.compare import scenes
+from gi_addon.compare.closed_forms import camera_rays, hits
 from gi_addon.compare.visible_light import light_unseen, visible_light
 from gi_addon.renderer import inspect
 from gi_addon.settings import Settings, walk
@@ -531,6 +532,57 @@ def test_a_mirror_shows_the_wall_down_to_its_foot(gl):
     foot = (floor & ~np.roll(floor, -1, axis=0))[:, 30:66]  # row 0 at the bottom: the floor's highest pixels
     assert foot.sum() >= 30
     assert lit[:, 30:66][foot] == pytest.approx(0.8 * 5.0 / np.sqrt(2.0) / np.pi, rel=0.02)
+
+
+def test_a_mirrored_sheet_is_as_wide_as_it_is(gl):
+    """Rays that run along a sheet's edge pass behind it, as near as they do: what a mirror floor shows of two narrow sheets has
+    the area of the exact picture, 3 %."""
+    b = scenes.SceneBuilder()
+    b.quads(FLOOR[None], scenes.principled(Metallic=1.0, Roughness=0.0, Base_Color=(1, 1, 1, 1)))
+    sheets = [np.array([-0.9, 0.5, 0.0]), np.array([0.6, 0.7, 0.0])]
+    across, up = np.array([0.1, 0.0, 0.0]), np.array([0.0, 0.0, 1.2])
+    for corner_ in sheets:
+        b.quads(np.array([[corner_, corner_ + across, corner_ + across + up, corner_ + up]]), scenes.diffuse((0.8,) * 3))
+    b.light(scenes.sun_light((0, 1, 0), 5.0))
+    scene = b.build(scenes.perspective((-0.3, -3.2, 1.4), (0, 0.3, 0.4), 0.9))
+    p = ssdo(scene, "Glossy Indirect", "Glossy Color", samples=16).passes
+    light = (p["Glossy Indirect"] * p["Glossy Color"])[..., 0]
+    fine = (8 * light.shape[1], 8 * light.shape[0])
+    eye, d = camera_rays(scene.camera, fine)
+    t, _, _ = hits(eye, d, FLOOR[0], FLOOR[1] - FLOOR[0], FLOOR[3] - FLOOR[0])
+    near = [hits(eye, d, c, across, up)[0] for c in sheets]
+    seen = np.isfinite(t) & (t < np.minimum(*near))
+    at, mirrored_way = eye + np.where(seen, t, 0.0)[..., None] * d, d * [1, 1, -1]
+    shown = seen & np.any([np.isfinite(hits(at, mirrored_way, c, across, up)[0]) for c in sheets], axis=0)
+    assert light.mean() / (0.8 * 5.0 / np.pi) == pytest.approx(shown.mean(), rel=0.03)
+
+
+@pytest.mark.parametrize("gathered", [True, False])
+def test_a_mirror_behind_a_box_shows_its_back(gl, gathered):
+    """The second layer is what the mirror sees and the eye does not: the back's own radiance, ρ E/π, 1 %, at every pixel that
+    mirrors it, with or without the gather."""
+    b = scenes.SceneBuilder()
+    glass, across, up = np.array([-2.0, 1.0, 0.0]), np.array([4.0, 0.0, 0.0]), np.array([0.0, 0.0, 2.0])
+    b.quads(np.array([[glass, glass + across, glass + across + up, glass + up]]),
+            scenes.principled(Metallic=1.0, Roughness=0.0, Base_Color=(1, 1, 1, 1)))  # fmt: skip
+    b.quads(scenes.box_quads((-0.8, -0.6, 0.0), (0.8, -0.2, 1.0)), scenes.diffuse((0.8,) * 3))
+    b.light(scenes.sun_light((0, -1, -2.2), 5.0))
+    scene = b.build(scenes.perspective((0, -3.2, 2.2), (0, 0.3, 0.9), 0.9))
+
+    def shown():
+        p = ssdo(scene, "Glossy Indirect", "Glossy Color", "Depth", samples=1, use_indirect_diffuse=gathered).passes
+        light, depth = (p["Glossy Indirect"] * p["Glossy Color"])[..., 0], p["Depth"][..., 0]
+        eye, d = camera_rays(scene.camera, light.shape[::-1])
+        t, _, _ = hits(eye, d, glass, across, up)
+        at = eye + np.where(np.isfinite(t), t, 0.0)[..., None] * d
+        _, x, z = hits(at, d * [1, -1, 1], np.array([-0.8, -0.2, 0.0]), np.array([1.6, 0, 0]), np.array([0, 0, 1.0]))
+        # A sub-frame's pixels are half a pixel off: none at the edges of what is mirrored.
+        inside = (np.abs(x - 0.5) < 0.45) & (np.abs(z - 0.5) < 0.4) & (depth > 4.0) & np.isfinite(t)
+        assert inside.sum() > 100
+        return light[inside]
+
+    radiance, back = 0.8 * 5.0 / np.hypot(1.0, 2.2) / np.pi, shown()
+    assert back == pytest.approx(np.full_like(back, radiance), rel=0.01)
 
 
 def test_a_rough_mirror_reflects_less_of_a_small_wall(gl):

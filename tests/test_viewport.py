@@ -34,7 +34,6 @@ def steps():
     out = {}
     scene = studio()
     area, space, region = view()
-    window = bpy.context.window_manager.windows[0]
     space.shading.type = "RENDERED"
     space.region_3d.view_perspective = "CAMERA"
     yield 0.3
@@ -49,8 +48,6 @@ def steps():
         yield 0.15
         yield settled
         snap(name)
-    def here():
-        return bpy.context.temp_override(window=window, area=area, region=region)
     snap("start")
     scene.objects["White"].select_set(True)
     yield from changed("select")
@@ -105,18 +102,11 @@ def steps():
     yield from changed("undo")
     out["undone to"] = float(v._scene.bounds()[1][2])
     scene = bpy.context.scene
-    with here():
-        bpy.ops.screen.area_split(direction="VERTICAL", factor=0.5)
-    for a in window.screen.areas:
-        if a.type == "VIEW_3D":
-            a.spaces.active.shading.type = "RENDERED"
+    second_view()
     yield 0.3
     yield from changed("two viewports")
     shot({shot!r})
-    done = []
-    bpy.app.handlers.render_complete.append(lambda *_: done.append(True))
-    scene.render.resolution_x, scene.render.resolution_y, scene.quartet.samples = 160, 90, 4
-    bpy.ops.render.render("INVOKE_DEFAULT")
+    done = final_render(4)
     for _ in range(5):
         bpy.data.objects["White"].location.x -= 0.05
         yield 0.05
@@ -159,11 +149,8 @@ def steps():
     scene.quartet.viewport_samples = 64
     bpy.ops.wm.save_as_mainfile(filepath=path)
     area, space, region = view()
-    window = bpy.context.window_manager.windows[0]
     space.shading.type = "RENDERED"
     yield 0.3
-    def here():
-        return bpy.context.temp_override(window=window, area=area, region=region)
     def at_work():
         return any(v._job is not None and not v._job.done() for v in viewport.viewports())
     def picture():
@@ -200,16 +187,9 @@ def steps():
     yield 0.2
     yield picture
     # A second viewport, and a final render meanwhile; then what they all show is deleted.
-    with here():
-        bpy.ops.screen.area_split(direction="VERTICAL", factor=0.5)
-    for a in window.screen.areas:
-        if a.type == "VIEW_3D":
-            a.spaces.active.shading.type = "RENDERED"
+    second_view()
     yield 0.3
-    ended = []
-    bpy.app.handlers.render_complete.append(lambda *_: ended.append(True))
-    scene.render.resolution_x, scene.render.resolution_y, scene.quartet.samples = 160, 90, 16
-    bpy.ops.render.render("INVOKE_DEFAULT")
+    ended = final_render(16)
     scene.objects["White"].location.x += 0.1
     yield at_work
     mesh = bpy.data.objects["White"].data
@@ -250,7 +230,6 @@ def steps():
     scene = studio()
     scene.quartet.viewport_samples = 1
     area, space, region = view()
-    window = bpy.context.window_manager.windows[0]
     space.shading.type, space.region_3d.view_perspective = "RENDERED", "CAMERA"
     yield 0.3
     yield settled
@@ -262,8 +241,6 @@ def steps():
             rss = int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
         gl = shared().call(lambda gl: (gl.bytes(), len(gl.resources())))
         return dict(rss=rss, gl=gl[0], objects=gl[1])
-    def here():
-        return bpy.context.temp_override(window=window, area=area, region=region)
     def shown():
         return not v._dirty and v._picture.request.key == v._request.key
     changes, undos = {}, {}

@@ -73,8 +73,6 @@ KNOWN: dict[tuple[str, str], str] = {
     "none changes in 15 of 24 steps, in 1 where every pixel gathers",
     ("VCT", "8"): "the same error of one sub-frame: 1.1 % of .5 %, .73 % with four times the cones, .3 % where every pixel "
     "gathers",
-    ("SSDO", "6"): "the lit floor's edge moves by whole pixels, ± 2.5 % at the wall's top: .0104; finding that edge between the "
-    "samples to a pixel's precision gives .0135; 4 sub-frames leave .007",
 }
 
 

@@ -20,9 +20,9 @@ AXES: dict[str, dict[str, tuple]] = {
 }
 SUBFRAMES = {"none": (), "presets": (), "samples": (1, 4), "quick": (1, 4, 16), "full": (1, 2, 4, 8, 16, 32, 64)}
 CYCLES_SAMPLES = {
-    "none": (1, 16), "presets": (1, 4), "samples": (1, 4, 16), "quick": (1, 4, 16, 64), "full": (1, 2, 4, 8, 16, 32, 64),
+    "none": (1, 16), "presets": (1, 4), "samples": (1, 4, 16, 64), "quick": (1, 4, 16, 64), "full": (1, 2, 4, 8, 16, 32, 64),
 }  # fmt: skip
-EEVEE_SAMPLES = {"none": (16,), "presets": (1, 4), "samples": (1, 16), "quick": (1, 16), "full": (1, 4, 16, 64)}
+EEVEE_SAMPLES = {"none": (16,), "presets": (1, 4), "samples": (1, 4), "quick": (1, 16), "full": (1, 4, 16, 64)}
 
 
 @dataclass(frozen=True)

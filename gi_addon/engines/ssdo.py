@@ -48,7 +48,7 @@ from ..settings import Settings
 
 def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
     """Figure 4d, in order; each further bounce repeats the gather."""
-    layers_behind = range(2, settings.ssdo.layers + 1) if settings.use_indirect_diffuse else ()
+    layers_behind = range(2, settings.ssdo.layers + 1)
     bounces = []
     for bounce in range(1, settings.bounces + 1):
         last = bounce == settings.bounces
@@ -56,8 +56,8 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
             SentLight(bounce),
             InterpolatedIndirect(f"ssdo.sent.{bounce}", f"ssdo.low.{bounce}", layers_behind, last=last),
             _smoothing(f"ssdo.sent.{bounce}", f"ssdo.low.{bounce}"),
-            IndirectLighting(f"ssdo.sent.{bounce}", f"ssdo.low.{bounce}",
-                             "indirect.diffuse" if last else f"ssdo.bounce.{bounce}", layers_behind),
+            *_lighting(f"ssdo.sent.{bounce}", f"ssdo.low.{bounce}",
+                       "indirect.diffuse" if last else f"ssdo.bounce.{bounce}", layers_behind),
         ]  # fmt: skip
     return [
         BRDFTables(),
@@ -73,7 +73,7 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         AOBlur(),
         InterpolatedIndirect("gbuffer.emission", "screen.low"),
         _smoothing("gbuffer.emission", "screen.low"),
-        IndirectLighting("gbuffer.emission", "screen.low", "screen.light"),
+        *_lighting("gbuffer.emission", "screen.low", "screen.light"),
         WorldRays(),
         DirectLighting() if settings.ssdo.shadows == "MAPS" or not settings.use_shadows else ScreenShadowLighting(),
         *(task for layer in layers_behind for task in _layer(layer)),
@@ -101,12 +101,28 @@ def _layer(layer: int) -> list[Pass]:
 # What a gather takes, and what it makes (gather_lib.glsl, lighting_frag.glsl).
 _SENT = {"SENT_NOTHING": 0, "SENT_BOUNCE": 1, "SENT_EMISSION": 2}
 _TARGET = {"TARGET_INDIRECT": 0, "TARGET_BOUNCE": 1, "TARGET_SCREEN_LIGHT": 2}
+_LIT = {
+    "TARGET_INDIRECT": Texture("indirect.diffuse", "indirect_diffuse", LIGHT, "rgba32f", _screen),
+    "TARGET_BOUNCE": Texture("ssdo.bounce", "last_bounce", LIGHT, "rgba32f", _screen),  # of each bounce but the last
+    "TARGET_SCREEN_LIGHT": Texture("screen.light", "screen_light", LIGHT, "rgba32f", _screen),
+}
+
+
+def _target(resource: str) -> str:
+    """The key of _LIT that a resource's light is of."""
+    return next((kind for kind, lit in _LIT.items() if lit.name == resource), "TARGET_BOUNCE")
+
 
 
 def _no_bounce(facts: Facts) -> str | None:
     if not facts.settings.use_indirect_diffuse:
         return "indirect diffuse is switched off"
     return "no visible material is diffuse" if not facts.diffuse else None
+
+
+def _no_rays(facts: Facts) -> str | None:
+    """Why nothing looks behind what the camera sees, or None."""
+    return _no_bounce(facts) and no_gloss(facts) and "nothing is gathered or mirrored"
 
 
 class ScreenPlanes(ScreenPass):
@@ -156,7 +172,7 @@ class Layer(GBuffer):
         return {"LAYER": self.layer, **{n: v for n, v in left_out.items() if n not in _present(self)}}
 
     def absent(self, facts: Facts) -> str | None:
-        return super().absent(facts) or _no_bounce(facts)
+        return super().absent(facts) or _no_rays(facts)
 
 
 def _present(task: Pass) -> set[str]:
@@ -195,14 +211,14 @@ class SentLight(ScreenPass):
             Optional(_of_layer("gbuffer.specular", layer)), Optional(_of_layer("gbuffer.lobe", layer)),
             Optional("brdf.average"), Optional("brdf.energy"), *before,
         )  # fmt: skip
-        name, glsl = (f"ssdo.sent.{bounce}", "ssdo_sent") if layer == 1 else (f"ssdo.layer{layer}.sent", f"ssdo_sent_{layer}")
+        name, glsl = (f"ssdo.sent.{bounce}", "ssdo_sent") if layer == 1 else [f"ssdo{c}layer{layer}{c}sent" for c in "._"]
         self.writes = (Texture(name, glsl, "radiance that leaves the surface, W/(m²·sr)", "rgba32f", _screen),)
 
     def defines(self, facts: Facts) -> dict[str, int]:
         return {"LAYER": self.layer, **({} if self.bounce > 1 else {"HAS_LAST_BOUNCE": 0})}
 
     def absent(self, facts: Facts) -> str | None:
-        return _no_bounce(facts)
+        return _no_bounce(facts) if self.layer == 1 else _no_rays(facts)
 
 
 _BOX = Uniform("ssdo_box", "vec4", "the rectangle of the screen that the scene's box covers: low x, y, high x, y, pixels")
@@ -300,18 +316,40 @@ class IndirectLighting(_Gather):
     def __init__(self, sent: str, low: str, target: str, layers_behind: Sequence[int] = ()) -> None:
         self.sent = sent
         self.title = _title(sent)
-        self.target = {"indirect.diffuse": "INDIRECT", "screen.light": "SCREEN_LIGHT"}.get(target, "BOUNCE")
         self.reads = (
             "ssdo.planes", _read(sent), "gbuffer.depth", "gbuffer.normal", Optional("gbuffer.low_depth"),
             Optional("gbuffer.low_normal"), Optional("gbuffer.low_pixel"), Optional(low), Optional(f"{low}.direction"),
             *self.behind(layers_behind),
         )  # fmt: skip
-        self.last = self.target == "INDIRECT"
-        glsl = {"INDIRECT": "indirect_diffuse", "SCREEN_LIGHT": "screen_light", "BOUNCE": "last_bounce"}[self.target]
-        self.writes = (Texture(target, glsl, LIGHT, "rgba32f", _screen),)
+        self.last = target == "indirect.diffuse"
+        self.target = _target(target)
+        rough = replace(_LIT[self.target], name=f"{target}.rough", glsl="rough_light", scratch=True,
+                        doc=f"{LIGHT}; 0 where none is wanted, 1 interpolated, 2 gathered here")  # fmt: skip
+        self.writes = (replace(_LIT[self.target], name=target) if self.target == "TARGET_BOUNCE" else rough,)
 
     def defines(self, facts: Facts) -> dict[str, int]:
-        return {**super().defines(facts), **_TARGET, "TARGET": _TARGET[f"TARGET_{self.target}"]}
+        return {**super().defines(facts), **_TARGET, "TARGET": _TARGET[self.target]}
+
+
+class PixelSmoothing(ScreenPass):
+    """Neighbouring pixels that gathered afresh share their directions, as blocks do."""
+
+    figure = "Gaussian Blur"
+    fragment = "engines/ssdo/smooth_pixels_frag.glsl"
+
+    def __init__(self, sent: str, target: str) -> None:
+        self.title = f"{_title(sent)} (smoothing of pixels)"
+        self.reads = (f"{target}.rough", "gbuffer.depth", "gbuffer.normal")
+        self.target = _target(target)
+        self.writes = (_LIT[self.target],)
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return {**_TARGET, "TARGET": _TARGET[self.target]}
+
+
+def _lighting(sent: str, low: str, target: str, layers_behind: Sequence[int] = ()) -> list[Pass]:
+    smoothing = [PixelSmoothing(sent, target)] if _target(target) != "TARGET_BOUNCE" else []
+    return [IndirectLighting(sent, low, target, layers_behind), *smoothing]
 
 
 def _shaded_screen_wanted(facts: Facts) -> bool:
@@ -415,13 +453,16 @@ REFLECTED_SOURCES = Texture("reflected.sources", "reflected_sources", "radiance 
                             "of emissive pixels, W/(m²·sr)", "rgba32f", _screen)  # fmt: skip
 
 
+# What a ray through the depth buffer is traced in, and the light that it finds (trace_lib.glsl).
+_TRACED = ("ssdo.planes", "ssdo.pyramid", "ssdo.shaded", Optional(_planes(2)), Optional("ssdo.layer2.sent"))
+
+
 class Reflections(Pass):
     """Glossy reflections of the screen."""
 
     title = "SSDO Reflections"
     reads = (
-        "ssdo.planes", "ssdo.pyramid", "ssdo.shaded", "gbuffer.depth", "gbuffer.normal", *LOBE,
-        Optional("gbuffer.emission", ("sources.traced",)),
+        *_TRACED, "gbuffer.depth", "gbuffer.normal", *LOBE, Optional("gbuffer.emission", ("sources.traced",)),
     )  # fmt: skip
     writes = (
         GLOSSY_TRACED, SOURCES_TRACED, GLOSSY_RAY,
@@ -497,8 +538,7 @@ class Refraction(Pass):
     title = "SSDO Refraction"
     figure = "Lighting Computation"
     reads = (
-        "ssdo.planes", "ssdo.pyramid", "ssdo.shaded", *REFRACTING,
-        Optional("gbuffer.emission"),
+        *_TRACED, *REFRACTING, Optional("gbuffer.emission"),
     )  # fmt: skip
     writes = (TRANSMISSION_INDIRECT,)
     uniforms = Reflections.uniforms

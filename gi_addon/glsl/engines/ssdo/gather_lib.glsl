@@ -127,13 +127,13 @@ Gathered gather_screen(vec3 position_ws, vec3 n, vec3 ng, vec3 v, ivec2 place)
 #endif
                 r = scan_next(ssdo_planes_2, scan_2, slice, k, end);
                 if (r.sectors != 0u) {
-                    take(g, mask, filled, r, reach, faces(plane, at, origin), texelFetch(ssdo_sent_2, at, 0).rgb, slice, n, v, t);
+                    take(g, mask, filled, r, reach, faces(plane, at, origin), texelFetch(ssdo_layer2_sent, at, 0).rgb, slice, n, v, t);
                 }
 #endif
 #if LAYERS > 2
                 r = scan_next(ssdo_planes_3, scan_3, slice, k, last_thing_ends(behind));
                 if (r.sectors != 0u) {
-                    take(g, mask, filled, r, reach, faces(behind, at, origin), texelFetch(ssdo_sent_3, at, 0).rgb, slice, n, v, t);
+                    take(g, mask, filled, r, reach, faces(behind, at, origin), texelFetch(ssdo_layer3_sent, at, 0).rgb, slice, n, v, t);
                 }
 #endif
                 mask |= filled;

@@ -6,15 +6,15 @@
 #if LAYER == 2
 #define PLANES ssdo_planes_2
 #define PLANES_BEFORE ssdo_planes
-#define SENT_LIGHT ssdo_sent_2
+#define SENT_LIGHT ssdo_layer2_sent
 #elif LAYER == 3
 #define PLANES ssdo_planes_3
 #define PLANES_BEFORE ssdo_planes_2
-#define SENT_LIGHT ssdo_sent_3
+#define SENT_LIGHT ssdo_layer3_sent
 #elif LAYER == 4
 #define PLANES ssdo_planes_4
 #define PLANES_BEFORE ssdo_planes_3
-#define SENT_LIGHT ssdo_sent_4
+#define SENT_LIGHT ssdo_layer4_sent
 #else
 #define PLANES ssdo_planes
 #define SENT_LIGHT ssdo_sent

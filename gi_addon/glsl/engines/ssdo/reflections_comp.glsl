@@ -39,17 +39,15 @@ void main()
         if (ray.passes) {
             Traced hit = trace(ray.position_ws, ray.direction, 2.0 * view.scene_radius, ssdo_thickness);
             float distance = hit.found ? hit.distance : NOT_FOUND;
-            ivec2 met = ivec2(hit.at);
-            vec3 here = vec3(vec2(pixel) + 0.5, nearness(depth));
-            bool front = hit.found && faces(texelFetch(ssdo_planes, met, 0), met, here);
+            bool front = hit.found && met_front(hit, vec3(vec2(pixel) + 0.5, nearness(depth)));
             float known = 0.0; // fades towards the picture's edge, so that nothing pops in
             vec3 light = vec3(0.0);
             if (front) {
                 vec2 inside = min(hit.at, view.resolution - hit.at) / (FADE * view.resolution.y);
                 known = smoothstep(0.0, 1.0, min(inside.x, inside.y));
-                indirect = traced_light(known * texelFetch(ssdo_shaded, met, 0).rgb, distance);
+                indirect = traced_light(known * met_light(hit), distance);
 #if TRACE_EMISSION
-                light += known * texelFetch(gbuf_emission, met, 0).rgb;
+                light += hit.hidden ? vec3(0.0) : known * texelFetch(gbuf_emission, hit.pixel, 0).rgb;
 #endif
             }
 #if TRACE_WORLD

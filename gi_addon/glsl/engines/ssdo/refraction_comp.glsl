@@ -23,11 +23,10 @@ void main()
         RefractedRay ray = refracted_ray(pixel, depth, u, pixel_width(depth));
         if (ray.passes) {
             Traced hit = trace(ray.position_ws, ray.direction, 2.0 * view.scene_radius, ssdo_thickness);
-            ivec2 met = ivec2(hit.at);
-            if (hit.found && faces(texelFetch(ssdo_planes, met, 0), met, screen_from_ws(ray.position_ws))) {
-                vec3 radiance = texelFetch(ssdo_shaded, met, 0).rgb;
+            if (hit.found && met_front(hit, screen_from_ws(ray.position_ws))) {
+                vec3 radiance = met_light(hit);
 #if HAS_GBUF_EMISSION
-                radiance += texelFetch(gbuf_emission, met, 0).rgb;
+                radiance += hit.hidden ? vec3(0.0) : texelFetch(gbuf_emission, hit.pixel, 0).rgb;
 #endif
                 seen = vec4(radiance * texelFetch(gbuf_transmission, pixel, 0).rgb, 1.0);
             }

@@ -116,8 +116,12 @@ Covered scan_next(sampler2D planes, inout Scan scan, Slice slice, int k, vec4 en
         float least = 0.1 * nearness_of_pixel(scan.origin);
         bool at_edge = a.pixel == ivec2(scan.origin.xy) && abs(gap) < least && abs(gap_latest) > least;
         gap = at_edge ? 0.0 : gap;
-        bool meet = (at_edge || gap * gap_latest < 0.0) && min(a.plane.x, b.plane.x) > 0.5 * NOTHING;
-        until = meet ? mix(scan.since, latest, gap / (gap - gap_latest)) : max(scan.since, sqr(0.5 * (sqrt(a.s) + sqrt(b.s))));
+        // A way that runs along an edge has been beyond it for some pixels whose middles are not: it passed it before `since` if
+        // b, continued to the middle of `a`, is on the other side of a.
+        float gap_middle = a.plane.x - plane_at(b, vec2(a.pixel) + 0.5);
+        bool passed = gap * gap_middle < 0.0 && gap * (gap_latest - gap) > 0.0;
+        bool meet = (at_edge || passed || gap * gap_latest < 0.0) && min(a.plane.x, b.plane.x) > 0.5 * NOTHING;
+        until = meet ? max(mix(scan.since, latest, gap / (gap - gap_latest)), 0.0) : max(scan.since, sqr(0.5 * (sqrt(a.s) + sqrt(b.s))));
     }
     if (a.plane.x > 0.5 * NOTHING && a.pixel != ivec2(scan.origin.xy)) {
         vec2 d = slice_toward(scan, a, a.s);
