@@ -36,6 +36,7 @@ RESOURCES: dict[str, tuple[tuple[str, str], ...]] = {
 # What must be for a setting, or all of a group, to change the picture: settings that are on, or have that value.
 NEEDS: dict[str, tuple[str, ...]] = {
     "gather_scale": ("use_indirect_diffuse",),
+    "share_reflections": ("use_glossy",),
     "shadows": ("use_shadows",),
     "ao": ("use_ao",),
     "world.aimed": ("use_shadows",),

@@ -56,8 +56,8 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
             SentLight(bounce),
             InterpolatedIndirect(f"ssdo.sent.{bounce}", f"ssdo.low.{bounce}", layers_behind, last=last),
             _smoothing(f"ssdo.sent.{bounce}", f"ssdo.low.{bounce}"),
-            IndirectLighting(f"ssdo.sent.{bounce}", f"ssdo.low.{bounce}",
-                             "indirect.diffuse" if last else f"ssdo.bounce.{bounce}", layers_behind),
+            *_lighting(f"ssdo.sent.{bounce}", f"ssdo.low.{bounce}",
+                       "indirect.diffuse" if last else f"ssdo.bounce.{bounce}", layers_behind),
         ]  # fmt: skip
     return [
         BRDFTables(),
@@ -74,7 +74,7 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         AOBlur(),
         InterpolatedIndirect("gbuffer.emission", "screen.low"),
         _smoothing("gbuffer.emission", "screen.low"),
-        IndirectLighting("gbuffer.emission", "screen.low", "screen.light"),
+        *_lighting("gbuffer.emission", "screen.low", "screen.light"),
         WorldRays(),
         DirectLighting() if settings.ssdo.shadows == "MAPS" or not settings.use_shadows else ScreenShadowLighting(),
         *(task for layer in layers_behind for task in _layer(layer)),
@@ -103,6 +103,17 @@ def _layer(layer: int) -> list[Pass]:
 # What a gather takes, and what it makes (gather_lib.glsl, lighting_frag.glsl).
 _SENT = {"SENT_NOTHING": 0, "SENT_BOUNCE": 1, "SENT_EMISSION": 2}
 _TARGET = {"TARGET_INDIRECT": 0, "TARGET_BOUNCE": 1, "TARGET_SCREEN_LIGHT": 2}
+_LIT = {
+    "TARGET_INDIRECT": Texture("indirect.diffuse", "indirect_diffuse", LIGHT, "rgba32f", _screen),
+    "TARGET_BOUNCE": Texture("ssdo.bounce", "last_bounce", LIGHT, "rgba32f", _screen),  # of each bounce but the last
+    "TARGET_SCREEN_LIGHT": Texture("screen.light", "screen_light", LIGHT, "rgba32f", _screen),
+}
+
+
+def _target(resource: str) -> str:
+    """The key of _LIT that a resource's light is of."""
+    return next((kind for kind, lit in _LIT.items() if lit.name == resource), "TARGET_BOUNCE")
+
 
 
 def _no_bounce(facts: Facts) -> str | None:
@@ -307,18 +318,40 @@ class IndirectLighting(_Gather):
     def __init__(self, sent: str, low: str, target: str, layers_behind: Sequence[int] = ()) -> None:
         self.sent = sent
         self.title = _title(sent)
-        self.target = {"indirect.diffuse": "INDIRECT", "screen.light": "SCREEN_LIGHT"}.get(target, "BOUNCE")
         self.reads = (
             "ssdo.planes", _read(sent), "gbuffer.depth", "gbuffer.normal", Optional("gbuffer.low_depth"),
             Optional("gbuffer.low_normal"), Optional("gbuffer.low_pixel"), Optional(low), Optional(f"{low}.direction"),
             *self.behind(layers_behind),
         )  # fmt: skip
-        self.last = self.target == "INDIRECT"
-        glsl = {"INDIRECT": "indirect_diffuse", "SCREEN_LIGHT": "screen_light", "BOUNCE": "last_bounce"}[self.target]
-        self.writes = (Texture(target, glsl, LIGHT, "rgba32f", _screen),)
+        self.last = target == "indirect.diffuse"
+        self.target = _target(target)
+        rough = replace(_LIT[self.target], name=f"{target}.rough", glsl="rough_light", scratch=True,
+                        doc=f"{LIGHT}; 0 where none is wanted, 1 interpolated, 2 gathered here")  # fmt: skip
+        self.writes = (replace(_LIT[self.target], name=target) if self.target == "TARGET_BOUNCE" else rough,)
 
     def defines(self, facts: Facts) -> dict[str, int]:
-        return {**super().defines(facts), **_TARGET, "TARGET": _TARGET[f"TARGET_{self.target}"]}
+        return {**super().defines(facts), **_TARGET, "TARGET": _TARGET[self.target]}
+
+
+class PixelSmoothing(ScreenPass):
+    """Neighbouring pixels that gathered afresh share their directions, as blocks do."""
+
+    figure = "Gaussian Blur"
+    fragment = "engines/ssdo/smooth_pixels_frag.glsl"
+
+    def __init__(self, sent: str, target: str) -> None:
+        self.title = f"{_title(sent)} (smoothing of pixels)"
+        self.reads = (f"{target}.rough", "gbuffer.depth", "gbuffer.normal")
+        self.target = _target(target)
+        self.writes = (_LIT[self.target],)
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return {**_TARGET, "TARGET": _TARGET[self.target]}
+
+
+def _lighting(sent: str, low: str, target: str, layers_behind: Sequence[int] = ()) -> list[Pass]:
+    smoothing = [PixelSmoothing(sent, target)] if _target(target) != "TARGET_BOUNCE" else []
+    return [IndirectLighting(sent, low, target, layers_behind), *smoothing]
 
 
 def _shaded_screen_wanted(facts: Facts) -> bool:

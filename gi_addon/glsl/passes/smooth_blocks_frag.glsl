@@ -15,11 +15,6 @@
 #include "lib/sequence_lib.glsl"
 #include "passes/gather_receiver.glsl"
 
-// Pairs of opposite blocks, and their weight in a tent of three by three.
-const int PAIRS = 4;
-const ivec2 PAIR[PAIRS] = ivec2[PAIRS](ivec2(1, 0), ivec2(0, 1), ivec2(1, 1), ivec2(1, -1));
-const float WEIGHT[PAIRS] = float[PAIRS](0.5, 0.5, 0.25, 0.25);
-
 // Whether there is a block `other` and it shows the surface of `here`, no farther off than what lights either.
 bool same_surface(ivec2 other, ivec2 last, Receiver here, float nearness, float off_plane)
 {
