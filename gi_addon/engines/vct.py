@@ -16,8 +16,17 @@ from ..graph import Optional, Pass, Planned, Texture, Uniform
 from ..lights import Source, spread_profile
 from ..passes.brdf_tables import BRDFTables
 from ..passes.direct_lighting import DirectLighting, TranslucentLighting
-from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint, gather_scale, gather_size
-from ..passes.lights import LightList, RSMGeneration, ShadowMaps
+from ..passes.gbuffer import (
+    CameraTint,
+    GBuffer,
+    GBufferMips,
+    TranslucentBack,
+    TranslucentLayer,
+    TranslucentTint,
+    gather_scale,
+    gather_size,
+)
+from ..passes.lights import LightList, RSMGeneration, ShadowMaps, ShadowTint
 from ..passes.occupancy import Occupancy
 from ..passes.reflections import GLOSSY_RAY, GLOSSY_TRACED, reflection_sharing
 from ..passes.resolve import Resolve
@@ -49,11 +58,12 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         Occupancy(),
         WorldGuide(),
         LightList(),
-        *([] if settings.vct.shadow_cones else [ShadowMaps()]),
+        *([] if settings.vct.shadow_cones else [ShadowMaps(), ShadowTint()]),
         RSMGeneration(),
         Voxelisation(),
         RadianceInjection(),
         GBuffer(),
+        CameraTint(),
         TranslucentLayer(),
         TranslucentBack(),
         TranslucentTint(),

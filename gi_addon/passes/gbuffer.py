@@ -151,6 +151,25 @@ class TranslucentTint(Pass):
         frame.gl.ctx.blend_func = moderngl.DEFAULT_BLENDING
 
 
+class CameraTint(Pass):
+    """The tint of all coloured transparent surfaces down to the opaque one."""
+
+    title = "Camera Tint"
+    reads = ("gbuffer.depth",)
+    writes = (
+        Texture("gbuffer.tint", "gbuf_tint", "share of what is behind that coloured transparent surfaces leave, by channel",
+                "rgba16f", _screen),
+    )  # fmt: skip
+
+    def absent(self, facts: Facts) -> str | None:
+        return None if facts.tinted else "nothing see-through has a colour"
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        frame.gl.ctx.blend_func = moderngl.ZERO, moderngl.SRC_COLOR
+        draw_for_camera(frame, planned, "passes/camera_tint_frag.glsl", "tinted", clear=1.0, mode=moderngl.BLEND)
+        frame.gl.ctx.blend_func = moderngl.DEFAULT_BLENDING
+
+
 def _nothing_refracts(facts: Facts) -> str | None:
     return no_translucency(facts) or (None if facts.transmissive else "no visible material refracts")
 

@@ -15,7 +15,7 @@
 // is seen or nothing; what it shifts colours by in half shadow is v's covariance with P, of order 1/K.
 Gathered gather_vpls(vec3 position_ws, vec3 n, vec3 ng, vec3 to_eye)
 {
-    Gathered g = Gathered(vec3(0.0), vec4(0.0));
+    Gathered g = gathered_nothing();
     vec3 start_ws = position_ws;
 #if HAS_OCCUPANCY
     start_ws = cells_clear_along(position_ws, ng, to_eye);
@@ -29,6 +29,9 @@ Gathered gather_vpls(vec3 position_ws, vec3 n, vec3 ng, vec3 to_eye)
         total += light.arriving;
         open.radiance += light.radiance;
         open.direction += vec4(light.direction, 1.0) * light.arriving;
+#ifdef GATHER_SLOPE
+        g.slope += vec4(light.slope, luminance(light.radiance));
+#endif
     }
     if (total <= 0.0) {
         return g;
@@ -73,6 +76,9 @@ Gathered gather_vpls(vec3 position_ws, vec3 n, vec3 ng, vec3 to_eye)
     for (int i = 0; i < vpl_count; ++i) {
         Vpl vpl = vpls[i];
         VplLight light = vpl_light(vpl, position_ws, n, ng, 1.0);
+#ifdef GATHER_SLOPE
+        g.slope += vec4(light.slope, luminance(light.radiance));
+#endif
         if (light.arriving > 0.0 && !vpl_hidden(vpl, start_ws, position_ws)) {
             g.radiance += light.radiance;
             g.direction += vec4(light.direction, 1.0) * light.arriving;
