@@ -227,7 +227,7 @@ def test_a_lamp_close_to_a_floor_lights_it_and_hides_what_is_below(gl, cells, up
     b.quads((lamp if up else lamp[::-1])[None], scenes.emissive((1, 1, 1), 10.0))
     b.quads(np.array([[[-0.5, -0.5, 1.5], [-0.5, 0.5, 1.5], [0.5, 0.5, 1.5], [0.5, -0.5, 1.5]]]), scenes.diffuse((0.5,) * 3))
     scene = b.build(scenes.perspective((0, 0, 0.9), (0, 0.001, 1.5), 0.9))
-    image = vct(scene, "Diffuse Indirect", samples=16, resolution=(32, 18)).passes["Diffuse Indirect"]
+    image = vct(scene, "Diffuse Indirect", samples=16, resolution=(32, 18), vct__cones=12).passes["Diffuse Indirect"]
     edge = np.sinh(np.linspace(-3.0, 3.0, 161))
     edge *= 2.0 / edge[-1]
     middle, width = (edge[1:] + edge[:-1]) / 2, np.diff(edge)
