@@ -9,8 +9,8 @@ from conftest import make, pictures_to
 
 from gi_addon.compare import scenes
 from gi_addon.compare.metrics import rel_mse
-from gi_addon.renderer import inspect
-from gi_addon.scene import Instances, Link, Material, Node, ShaderGraph
+from gi_addon.renderer import Renderer, inspect
+from gi_addon.scene import Image, Instances, Link, Material, Node, ShaderGraph
 from gi_addon.settings import Settings
 
 
@@ -78,7 +78,8 @@ def test_a_flat_plane_never_lights_itself(gl):
 def test_energy_does_not_depend_on_map_or_sample_count(gl):
     scene = scenes.cornell(blocks=False)
     means = [
-        make(scene, "Diffuse Indirect", samples=8, rsm__resolution=r, rsm__samples=n).passes["Diffuse Indirect"].mean()
+        make(scene, "Diffuse Indirect", samples=32, rsm__resolution=r, rsm__samples=n, resolution=(48, 27))
+        .passes["Diffuse Indirect"].mean()
         for r, n in ((64, 200), (256, 200), (512, 50), (512, 400))
     ]
     assert max(means) / min(means) < 1.03
@@ -143,6 +144,38 @@ def test_the_same_input_gives_the_same_picture_bit_for_bit(gl):
     scene = scenes.cornell(light="area")
     a, b = (make(scene, "Combined", samples=3).passes["Combined"] for _ in range(2))
     assert np.array_equal(a, b)
+
+
+def test_what_a_renderer_drew_before_changes_nothing(gl):
+    """Stability test 16 over a renderer's history: light maps, their textures' sharpness and importance are kept, but for what
+    hangs on the number of sub-frames, the size or the camera."""
+    scene = scenes.corner()
+    texels = np.random.default_rng(1).integers(0, 255, (256, 256, 4), dtype=np.uint8)
+    scene.images = [Image("noise", np.where([False, False, False, True], np.uint8(255), texels))]
+    graph = (
+        Node("TEX_COORD", "coordinates", {}, {}),
+        Node("TEX_IMAGE", "image", {"Vector": Link(0, "Generated")}, {"image": 0, "interpolation": "Linear"}),
+        Node("BSDF_DIFFUSE", "floor", {"Color": Link(1, "Color")}),
+    )
+    scene.materials[0] = Material("Floor", ShaderGraph(graph, Link(2, "BSDF")))
+
+    def job(gl):
+        def draw(renderer, samples, size):
+            settings = Settings()
+            settings.set("samples", samples)
+            settings.set("rsm.resolution", 64)
+            return renderer.render(scene, settings, ("Diffuse Indirect",), resolution=size).passes["Diffuse Indirect"]
+
+        used, new = Renderer(gl), Renderer(gl)
+        draw(used, 1, (48, 27))
+        draw(used, 4, (64, 36))
+        out = draw(used, 4, (48, 27)), draw(new, 4, (48, 27))
+        used.close()
+        new.close()
+        return out
+
+    a, b = gl(job)
+    assert a.max() > 0.0 and np.array_equal(a, b)
 
 
 @pytest.mark.parametrize("scale", [1e-3, 1e3])
@@ -335,7 +368,8 @@ def test_a_pane_shows_what_is_behind_it(gl):
     pane = scenes.mesh_from_quads(scenes.box_quads((-0.6, -0.05, -0.5), (0.6, 0.05, 0.5)))
     options = {"samples": 8, "resolution": (64, 36)}
     plain = make(scenes.cornell(blocks=False), "Combined", **options).passes["Combined"][..., :3]
-    window = (slice(14, 22), slice(26, 38))
+    # Above row 18 the wall behind has no light but bounced: docs/techniques/rsm.md says what a real pane shows of that.
+    window = (slice(14, 18), slice(26, 38))
     for ior, low, high in ((1.0001, 0.97, 1.03), (1.45, 0.85, 1.05)):
         scene = with_object(scenes.cornell(blocks=False), pane, glass(ior), (0, -0.3, 1.0))
         p = make(scene, "Combined", "Transmission Indirect", "Transmission Color", **options).passes

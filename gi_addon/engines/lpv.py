@@ -22,8 +22,8 @@ from ..nested_grids import MOST_GRIDS, Grid, grids_needed, nested_grids
 from ..passes.ao import AOBlur
 from ..passes.brdf_tables import BRDFTables
 from ..passes.direct_lighting import DirectLighting, TranslucentLighting
-from ..passes.gbuffer import GBuffer, TranslucentBack, TranslucentLayer, TranslucentTint
-from ..passes.lights import LightList, RSMGeneration, ShadowMaps
+from ..passes.gbuffer import CameraTint, GBuffer, TranslucentBack, TranslucentLayer, TranslucentTint
+from ..passes.lights import LightList, RSMGeneration, ShadowMaps, ShadowTint
 from ..passes.occupancy import CELL_UNIFORMS, Occupancy, set_cells
 from ..passes.reflections import GLOSSY_RAY, GLOSSY_TRACED, reflection_sharing
 from ..passes.resolve import Resolve
@@ -69,11 +69,13 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         WorldGuide(),
         LightList(),
         ShadowMaps(),
+        ShadowTint(),
         RSMGeneration(),
         GeometryInjection(),
         AirVolume(),
         injection,
         GBuffer(),
+        CameraTint(),
         TranslucentLayer(),
         TranslucentBack(),
         TranslucentTint(),

@@ -10,6 +10,8 @@ from __future__ import annotations
 
 from itertools import pairwise
 
+import numpy as np
+
 from ..facts import Facts
 from ..frame import Frame
 from ..gpu_types import LIGHT_MESH, VPL
@@ -17,12 +19,13 @@ from ..graph import Buffer, Optional, Pass, Planned, Texture, Uniform
 from ..passes.ao import AOBlur, AOGeneration
 from ..passes.brdf_tables import BRDFTables
 from ..passes.direct_lighting import DirectLighting, TranslucentLighting
-from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint, gather_size
-from ..passes.lights import LightList, RSMGeneration, ShadowMaps
+from ..passes.gbuffer import CameraTint, GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint, gather_size
+from ..passes.lights import LightList, RSMGeneration, ShadowMaps, ShadowTint
 from ..passes.occupancy import CELL_UNIFORMS, Occupancy, set_cells
 from ..passes.reflections import GLOSSY_RAY, GLOSSY_TRACED, reflection_sharing
 from ..passes.resolve import Resolve
 from ..passes.screen import (
+    DIRECTION,
     INDIRECT_DIFFUSE,
     LOBE,
     REFRACTING,
@@ -46,11 +49,14 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         WorldGuide(),
         LightList(),
         ShadowMaps(),
+        ShadowTint(),
         RSMGeneration(),
         RSMFlux(),
         SurfacePoints(),
-        RSMSamplingPattern(settings),
         GBuffer(),
+        CameraTint(),
+        RSMImportance(settings),
+        RSMSamplingPattern(settings),
         TranslucentLayer(),
         TranslucentBack(),
         TranslucentTint(),
@@ -155,16 +161,108 @@ class RSMFlux(Pass):
             if planned.stale or facts.rig.moves(int(views[tile]["light"]), bounce=True):
                 frame.set(program, tile=tile)
                 frame.compute(planned, program, (size, size))
-        reduce = frame.program(planned, "reduce")
-        width, height = maps.size
-        level = 0
-        while max(width, height) > 1:
-            width, height = max(1, width // 2), max(1, height // 2)
-            flux.bind_to_image(0, read=True, write=False, level=level)
-            flux.bind_to_image(1, read=False, write=True, level=level + 1)
-            reduce.run(-(-width // 8), -(-height // 8))
-            frame.gl.ctx.memory_barrier()
-            level += 1
+        _sum_up(frame, frame.program(planned, "reduce"), flux)
+
+
+def _sum_up(frame: Frame, reduce, texture) -> None:
+    """Fill the levels of ``texture`` with sums over 2 × 2 texels of the level below, down to one texel."""
+    width, height = texture.size
+    level = 0
+    while max(width, height) > 1:
+        width, height = max(1, width // 2), max(1, height // 2)
+        texture.bind_to_image(0, read=True, write=False, level=level)
+        texture.bind_to_image(1, read=False, write=True, level=level + 1)
+        reduce.run(-(-width // 8), -(-height // 8))
+        frame.gl.ctx.memory_barrier()
+        level += 1
+
+
+# Points of the picture, and of surfaces where light bounces on, that virtual lights are drawn for.
+_RECEIVERS = 64
+_MOST_BLOCKS = 512
+
+
+def _block_level(facts: Facts) -> int:
+    """The level of the flux pyramid whose texels are drawn by importance: no more than ``_MOST_BLOCKS``, each of one map."""
+    width, height = facts.rig.bounce.size
+    level = 0
+    while (width >> level) * (height >> level) > _MOST_BLOCKS:
+        level += 1
+    return min(level, *((s - 1).bit_length() for s in facts.rig.bounce.sizes))
+
+
+def _block_count(facts: Facts) -> tuple[int, int]:
+    width, height = facts.rig.bounce.size
+    return max(1, width >> _block_level(facts)), max(1, height >> _block_level(facts))
+
+
+class RSMImportance(Pass):
+    """How much of what each block of RSM texels reflects arrives where it is seen: what to draw virtual lights by."""
+
+    title = "RSM Importance"
+    reads = (
+        "rsm.flux", "rsm.depth", "rsm.albedo", "rsm.normal", "rsm.lights", "rsm.views", "gbuffer.depth", "gbuffer.normal",
+        Optional("surface.points"),
+    )  # fmt: skip
+    writes = (
+        Texture("rsm.importance", "rsm_importance", "chance of the block of RSM texels to hold a virtual light", "r32f",
+                _block_count, mips=lambda f: max(_block_count(f)).bit_length() - 1),
+        Buffer("rsm.importance.blocks", "importance", "share of a block in what receivers get, over its flux, 1/W", "float",
+               np.dtype("f4"), lambda f: int(np.prod(_block_count(f))), scratch=True),
+        Buffer("rsm.importance.sent", "importance_sent", "what each block sends to each receiver, W", "float", np.dtype("f4"),
+               lambda f: int(np.prod(_block_count(f))) * _RECEIVERS, scratch=True),
+        Buffer("rsm.importance.total", "importance_total", "what each light's blocks send to each receiver, W", "float",
+               np.dtype("f4"), lambda f: len(f.rig.sources) * _RECEIVERS, scratch=True),
+    )  # fmt: skip
+    uniforms = (
+        Uniform("view_count", "int", "views in the list"),
+        Uniform("light_count", "int", "lights with reflective shadow maps"),
+        Uniform("point_first", "int", "the sub-frame's first surface point"),
+        Uniform("point_count", "int", "surface points of a bounce"),
+        *MEDIUM_UNIFORMS,
+        *CELL_UNIFORMS,
+    )
+    shaders = {
+        "main": {"compute": "engines/rsm/importance_comp.glsl"},
+        "total": {"compute": "engines/rsm/importance_total_comp.glsl"},
+        "mean": {"compute": "engines/rsm/importance_mean_comp.glsl"},
+        "share": {"compute": "engines/rsm/importance_share_comp.glsl"},
+        "reduce": {"compute": "engines/rsm/flux_reduce_comp.glsl"},
+    }
+
+    def __init__(self, settings: Settings) -> None:
+        self.reads = _tested(type(self).reads, settings)
+
+    def absent(self, facts: Facts) -> str | None:
+        return _adds_up(facts)
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return {**_gather_defines(facts), "BLOCK_LEVEL": _block_level(facts), "RECEIVERS": _RECEIVERS}
+
+    def run(self, frame: Frame, planned: Planned) -> bool:
+        facts, blocks = planned.facts, _block_count(planned.facts)
+        views, lights = len(facts.rig.bounce.sizes), len(facts.rig.sources)
+        # The first sub-frame's serves the others, whose samples are one even set only if all are drawn alike; and other pictures
+        # of the same, whatever it hangs on.
+        seen = (facts.stamps, facts.resolution, facts.subframes, facts.settings.as_dict())
+        if planned.stale or (frame.subframe == 0 and planned.memory.get("seen") != seen):
+            planned.memory["seen"] = seen
+            program = frame.program(planned)
+            set_medium(frame, program, facts)
+            set_cells(frame, program, facts)
+            frame.set(program, view_count=views, point_first=0, point_count=points_per_subframe(facts))
+            frame.compute(planned, program, (blocks[0] * blocks[1] * _RECEIVERS,), (64,))
+            for key, count in (("total", lights * _RECEIVERS), ("mean", blocks[0] * blocks[1])):
+                program = frame.program(planned, key)
+                frame.set(program, view_count=views, light_count=lights)
+                frame.compute(planned, program, (count,), (64,))
+        elif not facts.rig.any_moves(facts.rig.bounce, bounce=True):
+            return False
+        program = frame.program(planned, "share")
+        frame.set(program, view_count=views)
+        frame.compute(planned, program, blocks)
+        _sum_up(frame, frame.program(planned, "reduce"), frame.resources["rsm.importance"])
+        return True
 
 
 class RSMSamplingPattern(Pass):
@@ -172,7 +270,9 @@ class RSMSamplingPattern(Pass):
 
     title = "RSM Sampling Pattern"
     figure = "RSM Sampling Pattern"
-    reads = ("rsm.flux", "rsm.depth", "rsm.albedo", "rsm.normal", "rsm.lights", "rsm.views")
+    reads = (
+        "rsm.flux", Optional("rsm.importance"), "rsm.depth", "rsm.albedo", "rsm.normal", "rsm.lights", "rsm.views",
+    )  # fmt: skip
     writes = (
         Buffer("vpls.drawn", "drawn_vpls", "those of the first bounce, as they were drawn", "Vpl", VPL, first_count,
                scratch=True),
@@ -201,7 +301,7 @@ class RSMSamplingPattern(Pass):
         self.reads = _tested((*type(self).reads, *points), settings)
 
     def defines(self, facts: Facts) -> dict[str, int]:
-        return _gather_defines(facts)
+        return {**_gather_defines(facts), "BLOCK_LEVEL": _block_level(facts)}
 
     def run(self, frame: Frame, planned: Planned) -> None:
         program = frame.program(planned)
@@ -258,6 +358,11 @@ def _tested(reads: tuple, settings: Settings) -> tuple:
     return reads if settings.rsm.visibility == "NONE" else (Optional("occupancy"), *reads)
 
 
+def _adds_up(facts: Facts) -> str | None:
+    """Why a light's virtual lights must not hang on what other lights send, or None."""
+    return "lights are to add up exactly, each with what is its own" if facts.settings.rsm.own_samples else None
+
+
 class InterpolatedIndirect(ScreenPass):
     """Indirect irradiance at one pixel per block."""
 
@@ -267,8 +372,9 @@ class InterpolatedIndirect(ScreenPass):
     writes = (
         Texture("indirect.low", "low_indirect", "radiance a white Lambert surface would reflect, W/(m²·sr)", "rgba32f",
                 gather_size, scratch=True),
-        Texture("indirect.low_direction", "low_direction", "Σ luminance × direction, and Σ luminance, of what arrives",
-                "rgba32f", gather_size, scratch=True),
+        Texture("indirect.low_direction", "low_direction", DIRECTION, "rgba32f", gather_size, scratch=True),
+        Texture("indirect.low_slope", "low_slope", "gradient of that radiance over the position, over the radiance, 1/m",
+                "rgba32f", gather_size, scratch=True, when=_adds_up),
     )  # fmt: skip
     uniforms = (Uniform("vpl_count", "int", "virtual point lights in the list"), *CELL_UNIFORMS, *MEDIUM_UNIFORMS)
     fragment = "engines/rsm/gather_low_frag.glsl"
@@ -296,7 +402,7 @@ class IndirectLighting(ScreenPass):
     reads = (
         "vpls", "rsm.lights", "gbuffer.depth", "gbuffer.normal", Optional("gbuffer.low_depth"),
         Optional("gbuffer.low_normal"), Optional("gbuffer.low_pixel"), Optional("indirect.low"),
-        Optional("indirect.low_direction"), Optional("ao"),
+        Optional("indirect.low_direction"), Optional("indirect.low_slope"), Optional("ao"),
     )  # fmt: skip
     writes = (INDIRECT_DIFFUSE,)
     uniforms = (Uniform("vpl_count", "int", "virtual point lights in the list"), *CELL_UNIFORMS, *MEDIUM_UNIFORMS)

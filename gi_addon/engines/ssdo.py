@@ -22,8 +22,8 @@ from ..graph import Optional, Pass, Planned, Texture, Uniform, glsl_name
 from ..passes.ao import AOBlur, AOGeneration
 from ..passes.brdf_tables import BRDFTables
 from ..passes.direct_lighting import DirectLighting, TranslucentLighting
-from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint
-from ..passes.lights import LightList, ShadowMaps
+from ..passes.gbuffer import CameraTint, GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint
+from ..passes.lights import LightList, ShadowMaps, ShadowTint
 from ..passes.occupancy import Occupancy
 from ..passes.reflections import GLOSSY_RAY, GLOSSY_TRACED, reflection_sharing
 from ..passes.resolve import Resolve
@@ -65,6 +65,7 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         WorldGuide(),
         LightList(),
         ShadowMaps(),
+        ShadowTint(),
         GBuffer(),
         TranslucentTint(),
         GBufferMips(),
@@ -83,6 +84,7 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         Reflections(),
         *reflection_sharing(settings),
         *reflection_sharing(settings, SOURCES_TRACED, REFLECTED_SOURCES, "SHARED_SOURCES"),
+        CameraTint(),
         TranslucentLayer(),
         TranslucentBack(),
         TranslucentLighting(),
@@ -502,7 +504,7 @@ def _world(frame: Frame, planned: Planned, wanted: bool) -> Iterator[dict[str, s
         return
     frame.gpu.bind_world_params()
     frame.gpu.bind_images(frame.gpu.world, units)
-    yield {"generated/world.glsl": world_source(frame.gpu.world, units)}
+    yield {"generated/world.glsl": world_source(frame.gpu.world, units, camera=False)}
     frame.gpu.unbind_images(units, len(frame.gpu.world.images))
 
 

@@ -18,6 +18,10 @@ float image_coverage(vec2 uv, vec2 size, int extension)
     return extension == 4 && (any(lessThan(uv, vec2(0.0))) || any(greaterThan(uv, vec2(1.0)))) ? 0.0 : 1.0;
 }
 
+// Sub-frames average the picture's lookups, so each may be sharper; maps are kept, also when the number of sub-frames changes, and
+// show the mean over their texels.
+#define IMAGE_LOD_BIAS (view.lod_bias * float(SURFACE_SEEN_BY_CAMERA))
+
 vec4 node_image(sampler2D image, vec2 uv, int encoded, int extension)
 {
     if (extension == 3) {
@@ -25,7 +29,7 @@ vec4 node_image(sampler2D image, vec2 uv, int encoded, int extension)
         uv = 1.0 - abs(1.0 - f);
     }
 #if SURFACE_IMPLICIT_LOD
-    vec4 c = texture(image, uv, view.lod_bias);
+    vec4 c = texture(image, uv, IMAGE_LOD_BIAS);
 #else
     vec4 c = textureLod(image, uv, 0.0);
 #endif
@@ -74,7 +78,7 @@ vec4 node_image_around(sampler2D image, vec2 uv, int encoded, int extension)
     vec2 dy = dFdy(uv);
     dx.x = abs(dFdx(other)) < abs(dx.x) ? dFdx(other) : dx.x;
     dy.x = abs(dFdy(other)) < abs(dy.x) ? dFdy(other) : dy.x;
-    float sharper = exp2(view.lod_bias);
+    float sharper = exp2(IMAGE_LOD_BIAS);
     vec4 c = textureGrad(image, uv, dx * sharper, dy * sharper);
     if (encoded != 0) {
         c.rgb = srgb_decode(c.rgb);

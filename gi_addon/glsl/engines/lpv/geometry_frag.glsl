@@ -16,9 +16,8 @@ void main()
 {
     vec3 ng = safe_normalize(cross(dFdx(vary_position_ws), dFdy(vary_position_ws)));
 #if SURFACE_FULL
-    vec3 along = vec3(0.0);
-    along[axis] = 1.0;
-    Closure c = surface_closure(surface_point(along));
+    // Seen from its front: a wall whose back is cut away is a wall.
+    Closure c = surface_closure(surface_point(dot(vary_normal_ws, ng) < 0.0 ? -ng : ng));
     float opacity = surface_opacity(c);
     if (!surface_is_there(opacity, 2u)) {
         discard;

@@ -35,13 +35,30 @@ bool own_lamp_blocks(Light light, vec3 from_ws, vec3 to_ws)
 struct Gathered {
     vec3 radiance;    // E/π: what a white Lambert surface reflects, W/(m²·sr)
     vec4 direction;   // Σ luminance × direction to the source; Σ luminance
+#ifdef GATHER_SLOPE
+    vec4 slope;       // Σ ∇L, where L is the luminance of the radiance as if nothing stood between; Σ L
+#endif
 };
+
+Gathered gathered_nothing()
+{
+    Gathered g;
+    g.radiance = vec3(0.0);
+    g.direction = vec4(0.0);
+#ifdef GATHER_SLOPE
+    g.slope = vec4(0.0);
+#endif
+    return g;
+}
 
 // What a virtual light sends to a surface that nothing stands before.
 struct VplLight {
     vec3 radiance;    // E/π
     vec3 direction;   // towards it
     float arriving;   // luminance of E/π on a surface that faces it
+#ifdef GATHER_SLOPE
+    vec3 slope;       // gradient of the radiance's luminance over the receiver's position, 1/m of it
+#endif
 };
 
 // Its disc `widen` times as large as its own.
@@ -67,8 +84,18 @@ VplLight vpl_light(Vpl vpl, vec3 position_ws, vec3 n, vec3 ng, float widen)
     // Φ/A · K A/(1 + K A) without the area: Φ cos cos / (π d² + cos cos A); for a direction by the same bound but for the
     // receiver's own cosine.
     float product = cos_p * cos_x;
-    return VplLight(flux * (product / max(PI * d2 + product * area, 1e-37)), w,
-                    luminance(flux) * cos_p / max(PI * d2 + cos_p * area, 1e-37));
+    float spread = max(PI * d2 + product * area, 1e-37);
+    VplLight light;
+    light.radiance = flux * (product / spread);
+    light.direction = w;
+    light.arriving = luminance(flux) * cos_p / max(PI * d2 + cos_p * area, 1e-37);
+#ifdef GATHER_SLOPE
+    // With D from the receiver to the light, f = q/(π Dᵏ + q A), where q = (−D·n_p)(D·n), k = 4, and in air D·n, 3. Since
+    // ∇D = −1: ∇f = f π Dᵏ/(π Dᵏ + q A) (∇q/q + k D/D²), here in cosines.
+    vec3 turning = in_air ? 3.0 * product * w - n : 4.0 * product * w - cos_p * n + cos_x * vpl.normal_ws;
+    light.slope = product > 0.0 ? turning * (luminance(flux) * (PI * d2 / spread) * inverse / spread) : vec3(0.0);
+#endif
+    return light;
 }
 
 // Whether anything stands between a virtual light and a point, `start_ws` the point clear of the cells of its own surface.
@@ -89,7 +116,7 @@ bool vpl_hidden(Vpl vpl, vec3 start_ws, vec3 position_ws)
 // averaged so, `alone` is their number, and the disc the sub-frame's.
 Gathered gather_some_vpls(vec3 position_ws, vec3 n, vec3 ng, int first, int stride, float alone)
 {
-    Gathered g = Gathered(vec3(0.0), vec4(0.0));
+    Gathered g = gathered_nothing();
     vec3 start_ws = position_ws;
 #if HAS_OCCUPANCY
     start_ws = cells_clear(position_ws, ng);

@@ -1,11 +1,10 @@
-// Virtual point lights by hierarchical warping of a low-discrepancy set over the flux pyramid (P. Clarberg et al.,
-// "Wavelet Importance Sampling", SIGGRAPH 2005, §4).
+// Virtual point lights by hierarchical warping of a low-discrepancy set over the flux pyramid (warp_lib.glsl), whose coarse levels
+// hold blocks' chances by what the camera sees of them, if those are known (importance_share_comp.glsl); else chances are by flux.
 //
-// Each light draws by a sequence of its own, and has either `own_samples` of them, or a share of all N by its flux (systematic
-// sampling: N · share, rounded up or down from sub-frame to sub-frame). A texel is drawn with probability p = its share of the
-// light's flux, so each of a light's n samples stands for flux Φ/(n p): all carry the same luminance, and their sum is the
-// light's flux at any n ≥ 1. A light too dim for one sample in every sub-frame has one of flux Σ/(N p) now and then, Σ the flux
-// of all: right in the mean.
+// Each light draws by a sequence of its own, and has either `own_samples` of them, or a share of all N by its chance (systematic
+// sampling: N · share, rounded up or down from sub-frame to sub-frame). A texel of flux φ is drawn with probability p = its block's
+// share of the light's chance · φ/the block's flux, so each of a light's n samples stands for flux φ/(n p). A light too dim for one
+// sample in every sub-frame has one now and then, for n its N · share < 1: right in the mean.
 
 #include "engines/rsm/rsm_lib.glsl"
 #include "lib/view_lib.glsl"
@@ -13,18 +12,24 @@
 #if HAS_OCCUPANCY
 #include "lib/occupancy_lib.glsl"
 #endif
+#include "engines/rsm/warp_lib.glsl"
 
 layout(local_size_x = 64) in;
 
-float flux_at(ivec2 p, int level) { return texelFetch(rsm_flux, p, level).r; }
+// Of a texel of `level`, to a scale.
+float chance_at(ivec2 p, int level)
+{
+#if HAS_RSM_IMPORTANCE
+    return level >= BLOCK_LEVEL ? texelFetch(rsm_importance, p, level - BLOCK_LEVEL).r : flux_at(p, level);
+#else
+    return flux_at(p, level);
+#endif
+}
 
-// The level of the pyramid at which view `k` is one texel: tiles lie in blocks of a power of two (gi_addon/atlas.py).
-int view_level(int k) { return findMSB(2 * int(rsm_views[k].rect.z) - 1); }
-
-float view_flux(int k)
+float view_chance(int k)
 {
     int level = view_level(k);
-    return flux_at(ivec2(rsm_views[k].rect.xy) >> level, level);
+    return chance_at(ivec2(rsm_views[k].rect.xy) >> level, level);
 }
 
 uint view_salt(int k) { return rsm_lights[rsm_views[k].light].salt; }
@@ -48,7 +53,7 @@ void main()
 
     float total = 0.0;
     for (int k = 0; k < view_count; ++k) {
-        total += view_flux(k);
+        total += view_chance(k);
     }
     if (!(total > 0.0)) {
         return;
@@ -59,14 +64,14 @@ void main()
     int last = 0;
     int count = 0;
     int nth = 0;
-    float flux = 0.0;
+    float chance = 0.0;
     float before = 0.0;
     float all = 0.0;
     int begin = 0;
     int low = 0;
     int group = 0;
     for (int k = 0; k < view_count; ++k) {
-        all += view_flux(k);
+        all += view_chance(k);
         if (k + 1 == view_count || view_salt(k + 1) != view_salt(k)) {
             int high = k + 1 == view_count ? vpl_count : int(floor(float(vpl_count) * min(all / total, 1.0) + offset));
             low = own_samples > 0 ? group * own_samples : low;
@@ -76,7 +81,7 @@ void main()
                 last = k + 1;
                 count = high - low;
                 nth = i - low;
-                flux = all - before;
+                chance = all - before;
             }
             begin = k + 1;
             before = all;
@@ -84,53 +89,42 @@ void main()
             ++group;
         }
     }
-    if (count == 0 || !(flux > 0.0)) {
+    if (count == 0 || !(chance > 0.0)) {
         return;
     }
-    float mean_count = own_samples > 0 ? float(own_samples) : float(vpl_count) * flux / total;
-    // Luminance of the flux of one sample, W.
-    float each = mean_count >= 1.0 ? flux / float(count) : total / float(vpl_count);
+    float mean_count = own_samples > 0 ? float(own_samples) : float(vpl_count) * chance / total;
     vec2 u = sobol_2d(uint(floor(float(view.subframe) * mean_count)) + uint(nth), view_salt(first));
 
     int index = first;
-    float left_over = u.x * flux;
+    float left_over = u.x * chance;
     for (int k = first; k < last; ++k) {
-        float f = view_flux(k);
+        float f = view_chance(k);
         if (index == k && k + 1 < last && left_over >= f) {
             left_over -= f;
             index = k + 1;
         }
     }
-    float shown = view_flux(index);
+    float shown = view_chance(index);
     u.x = clamp(left_over / max(shown, 1e-30), 0.0, 0.99999994); // the float below 1
-    int top = view_level(index);
-    ivec2 p = ivec2(rsm_views[index].rect.xy) >> top;
-    for (int level = top - 1; level >= 0; --level) {
+    int level = view_level(index);
+    ivec2 p = ivec2(rsm_views[index].rect.xy) >> level;
+    float probability = 1.0 / chance;
+#if HAS_RSM_IMPORTANCE
+    for (; level > BLOCK_LEVEL; --level) {
         p *= 2;
-        float c00 = flux_at(p, level);
-        float c10 = flux_at(p + ivec2(1, 0), level);
-        float c01 = flux_at(p + ivec2(0, 1), level);
-        float c11 = flux_at(p + ivec2(1, 1), level);
-        float lower = c00 + c10;
-        float sum = lower + c01 + c11;
-        float split = sum > 0.0 ? lower / sum : 0.5;
-        bool upper = u.y >= split && sum - lower > 0.0;
-        u.y = upper ? (u.y - split) / max(1.0 - split, 1e-20) : u.y / max(split, 1e-20);
-        float left = upper ? c01 : c00;
-        float row = upper ? c01 + c11 : lower;
-        split = row > 0.0 ? left / row : 0.5;
-        bool right = u.x >= split && row - left > 0.0;
-        u.x = right ? (u.x - split) / max(1.0 - split, 1e-20) : u.x / max(split, 1e-20);
-        u = clamp(u, vec2(0.0), vec2(0.99999994));
-        p += ivec2(right ? 1 : 0, upper ? 1 : 0);
+        p += warp_child(chance_at(p, level - 1), chance_at(p + ivec2(1, 0), level - 1), chance_at(p + ivec2(0, 1), level - 1),
+                        chance_at(p + ivec2(1, 1), level - 1), u);
     }
+    probability *= chance_at(p, level) / max(flux_at(p, level), 1e-37);
+#endif
+    p = warp_by_flux(p, level, u);
     float texel_flux = flux_at(p, 0);
     if (!(texel_flux > 0.0)) {
         return;
     }
     LightView v = rsm_views[index];
     RsmTexel t = rsm_texel(index, p);
-    float weight = each / texel_flux;
+    float weight = 1.0 / ((mean_count >= 1.0 ? float(count) : mean_count) * probability * texel_flux);
     Vpl vpl = none;
     vpl.position_ws = t.position_ws;
     vpl.normal_ws = t.normal_ws;
@@ -140,10 +134,7 @@ void main()
     vpl.area = t.area * weight / float(view.subframes);
     vpl.clear_ws = t.position_ws;
 #if HAS_OCCUPANCY
-    vec3 to_light = v.perspective > 0.5 ? normalize(v.origin_ws - t.position_ws) : -v.axis_z;
-    // What leaves by the far side of a sheet does not see the light.
-    vpl.clear_ws = dot(to_light, t.normal_ws) > 0.0 ? cells_clear_along(t.position_ws, t.normal_ws, to_light)
-                                                    : cells_clear(t.position_ws, t.normal_ws);
+    vpl.clear_ws = texel_clear(v, t);
 #endif
     // The light, the map of it, and the place in that along a curve that keeps neighbours together (G. M. Morton, 1966).
     vpl.key = uint(index) << 22;
