@@ -48,6 +48,7 @@ OUTPUTS: dict[str, Output] = {
                "transmission_color"),
         Output("Transmission Color", "TransCol", "RGB", "COLOR", "use_pass_transmission_color", ("transmission_color",)),
         Output("Volume Direct", "VolumeDir", "RGB", "COLOR", "cycles.use_pass_volume_direct", ("volume_direct",)),
+        Output("Volume Indirect", "VolumeInd", "RGB", "COLOR", "cycles.use_pass_volume_indirect", ("volume_indirect",)),
         Output("Emission", "Emit", "RGB", "COLOR", "use_pass_emit", ("emission",)),
         Output("Environment", "Env", "RGB", "COLOR", "use_pass_environment", ("environment",)),
         Output("Ambient Occlusion", "AO", "RGB", "COLOR", "use_pass_ambient_occlusion", ("ao",)),
@@ -72,14 +73,16 @@ LONG_NAMES = {o.short: o.name for o in OUTPUTS.values()}
 #   gbuffer.tint                          share of what is behind that coloured transparent surfaces leave
 #   volume.light                          radiance scattered towards the eye in front of the surface; alpha: the mean share
 #                                         of the light behind that still passes
+#   volume.indirect                       the same of light that surfaces or the air have scattered before, where the technique
+#                                         knows it
 #   volume.transmittance                  that share by colour, where the technique knows it
 #   direct.shadow                         share of the direct irradiance that is not blocked: what a shadow catcher shows
 LAYERS: dict[str, tuple[str, ...]] = {
     "combined": (
         "gbuffer.depth", "gbuffer.diffuse", "gbuffer.emission", "direct.diffuse", "direct.glossy", "reflected.sources",
         "indirect.diffuse", "indirect.glossy", "gbuffer.transmission", "transmission.direct", "transmission.indirect",
-        "volume.light",
-        "volume.transmittance", "gbuffer.tint", "subsurface.direct", "subsurface.indirect", "direct.shadow",
+        "volume.light", "volume.indirect", "volume.transmittance", "gbuffer.tint", "subsurface.direct", "subsurface.indirect",
+        "direct.shadow",
     ),
     "depth": ("gbuffer.depth",),
     "normal": ("gbuffer.depth", "gbuffer.normal"),
@@ -101,6 +104,7 @@ LAYERS: dict[str, tuple[str, ...]] = {
                               "transmission.direct", "transmission.indirect", "volume.transmittance", "gbuffer.tint"),
     "transmission_color": ("gbuffer.depth", "gbuffer.transmission", "volume.transmittance", "gbuffer.tint"),
     "volume_direct": ("volume.light",),
+    "volume_indirect": ("volume.indirect",),
     "emission": ("gbuffer.depth", "gbuffer.emission", "volume.transmittance", "gbuffer.tint"),
     "environment": ("gbuffer.depth", "volume.transmittance", "gbuffer.tint"),
     "ao": ("gbuffer.depth", "ao"),

@@ -15,9 +15,22 @@ from .screen import ScreenPass, _screen, no_translucency
 BACKGROUND_DEPTH = 0.0  # no surface: view depths are positive
 
 
+# Blocks share where their cones end, the better the nearer they are to one another: fewer rows of blocks than this up the picture
+# are more error for no less time (docs/techniques/vct.md), since all the more pixels lie beside edges and gather for themselves.
+_ROWS_OF_BLOCKS = 72
+
+
+def gather_scale(facts: Facts) -> int:
+    """Pixels per side of one low-resolution gather."""
+    scale = facts.settings.gather_scale
+    if facts.settings.technique != "VCT":
+        return scale
+    return max(1, min(scale, facts.resolution[1] // _ROWS_OF_BLOCKS))
+
+
 def gather_size(facts: Facts) -> tuple[int, int]:
     """Texels of the low-resolution gather: the blocks that cover the picture wherever their grid starts."""
-    scale = facts.settings.gather_scale
+    scale = gather_scale(facts)
     return tuple(-(-(n + scale - 1) // scale) for n in facts.resolution)
 
 
@@ -228,4 +241,4 @@ class GBufferMips(ScreenPass):
     fragment = "passes/gbuffer_mips_frag.glsl"
 
     def defines(self, facts: Facts) -> dict[str, int]:
-        return {"GATHER_SCALE": facts.settings.gather_scale}
+        return {"GATHER_SCALE": gather_scale(facts)}

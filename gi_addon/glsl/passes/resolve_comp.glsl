@@ -54,6 +54,7 @@ void main()
     vec3 emission = vec3(0.0);
     vec3 environment = vec3(0.0);
     vec3 volume = vec3(0.0);
+    vec3 volume_bounced = vec3(0.0);
 
     if (surface) {
 #if HAS_GBUF_DIFFUSE
@@ -137,6 +138,9 @@ void main()
 #if HAS_GBUF_TINT
     passes *= texelFetch(gbuf_tint, pixel, 0).rgb;
 #endif
+#if HAS_VOLUME_INDIRECT
+    volume_bounced = texelFetch(volume_indirect, pixel, 0).rgb;
+#endif
     diffuse_color *= passes;
     through_color *= passes;
     diffuse_direct *= passes;
@@ -153,7 +157,7 @@ void main()
     vec3 behind = view.film_transparent < 0.5 ? environment : vec3(0.0);
     float alpha = !held && (surface || glass || view.film_transparent < 0.5) ? 1.0 : catcher ? saturate(1.0 - vector_mean(lit_share)) : 0.0;
     add(LAYER_COMBINED, pixel, vec4(diffuse_direct + diffuse_indirect + glossy_direct + glossy_indirect +
-                                        through_direct + through_indirect + volume + emission + behind,
+                                        through_direct + through_indirect + volume + volume_bounced + emission + behind,
                                     alpha));
 #endif
 #if LAYER_DEPTH >= 0
@@ -209,6 +213,9 @@ void main()
 #endif
 #if LAYER_VOLUME_DIRECT >= 0
     add(LAYER_VOLUME_DIRECT, pixel, vec4(volume, 1.0));
+#endif
+#if LAYER_VOLUME_INDIRECT >= 0
+    add(LAYER_VOLUME_INDIRECT, pixel, vec4(volume_bounced, 1.0));
 #endif
 #if LAYER_EMISSION >= 0
     add(LAYER_EMISSION, pixel, vec4(emission, 1.0));

@@ -47,9 +47,9 @@ void main()
 #if SURFACE_TABLES > 0
     albedo += lobe_albedo_average(brdf_average, brdf_energy, closure_lobe(c));
 #endif
-    vec3 share = saturate(albedo / max(opacity, 1e-4)) / max(dot(abs(ng), vec3(1.0)), 1.0);
+    vec3 share = saturate(albedo / max(opacity, 1e-4));
     for (int k = 0; k < 3; ++k) {
-        atomicAdd(lpv_albedo[face_index(cell, axis) * 3 + k], uint(share[k] * 255.0 + 0.5));
+        atomicAdd(lpv_albedo[face_index(cell, axis) * 3 + k], uint(share[k] * LPV_ALBEDO_UNITS));
     }
 #endif
 }
