@@ -169,6 +169,21 @@ def test_the_camera_sees_another_world_than_lights_the_scene(blender, gl):
     agree("backdrop", scene, ("Combined", "Diffuse Direct", "Environment"), rel_mse=0.05, gain=0.06)
 
 
+def test_portals_and_a_layer_without_sky_give_no_light(blender, gl):
+    """An area light that is a portal, and a world that the view layer leaves out: what is lit is what the sun lights."""
+    plain = scenes.plane_scene(scenes.sun_light((0.3, 0.5, -1.0), 1.0))
+    plain.world = scenes.world((0.5, 0.6, 0.9))
+    scene = put(blender, plain, size=SIZE, samples=8)
+    data = blender.data.lights.new("portal", "AREA")
+    data.energy, data.cycles.is_portal = 500.0, True
+    portal = blender.data.objects.new("portal", data)
+    portal.location = (0.0, 0.0, 2.0)
+    scene.collection.objects.link(portal)
+    scene.camera.rotation_euler.x += 0.25
+    blender.context.view_layer.use_sky = False
+    agree("portal", scene, ("Combined",), samples=16)
+
+
 def test_light_sees_only_the_lobes_it_may(blender, gl):
     """A light off for diffuse, one off for glossy."""
     bpy = blender

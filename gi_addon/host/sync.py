@@ -158,7 +158,8 @@ class SceneSync:
         for light, obj in lamps:
             light.receivers, light.blockers = placed.linking.masks(obj)
         scene.instances = placed.instances()
-        scene.world = self._read_world(getattr(layer, "world_override", None) or source.world, images)
+        sky = (getattr(layer, "world_override", None) or source.world) if layer.use_sky else None
+        scene.world = self._read_world(sky, images)
         sun = world_sun(scene.world.graph)
         if sun is not None and (sun.emission > 0.0).any():
             scene.lights.append(sun)
@@ -603,8 +604,10 @@ def _by_material(mesh, triangles: np.ndarray, triangle_count: int) -> tuple[np.n
 
 
 def _read_light(instance, obj: bpy.types.Object, notes: list[str], images: ImageTable) -> Light | None:
-    """A Light from Blender's, in Cycles' units."""
+    """A Light from Blender's, in Cycles' units; None of a portal, which shows Cycles where the sky is and gives no light."""
     data = obj.data
+    if data.type == "AREA" and getattr(data.cycles, "is_portal", False):
+        return None
     strength = float(data.energy) * 2.0 ** float(getattr(data, "exposure", 0.0))
     color = np.array(data.color, "f8")
     if getattr(data, "use_temperature", False):

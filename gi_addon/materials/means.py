@@ -290,7 +290,7 @@ class _Walk:
     def _image(self, node: Node, output: str):
         index = node.params.get("image")
         if index is None or index >= len(self.images):
-            return 0.0 if output == "Alpha" else np.zeros(3)
+            return 1.0 if output == "Alpha" else np.array([1.0, 0.0, 1.0])
         mean = image_mean(self.images[index])
         return float(mean[3]) if output == "Alpha" else mean[:3]
 

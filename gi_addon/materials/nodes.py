@@ -461,8 +461,8 @@ def _coordinate(c: Compiler, n: Node, default: str) -> str:
 def image_texture(c: Compiler, n: Node) -> dict[str, Value]:
     """An image looked up by UV (or whatever is linked): flat, box, sphere or tube projection."""
     index = n.params.get("image")
-    if index is None:
-        return {"Color": c.constant((0.0, 0.0, 0.0), COLOR), "Alpha": c.constant(0.0, FLOAT)}
+    if index is None:  # as Cycles shows what it does not find
+        return {"Color": c.constant((1.0, 0.0, 1.0), COLOR), "Alpha": c.constant(1.0, FLOAT)}
     co = _coordinate(c, n, f"vec3({c.attribute('uv:')}.xy, 0.0)")
     sampler = c.image(index, n.params.get("interpolation", "Linear"), n.params.get("extension", "REPEAT"))
     projection = n.params.get("projection", "FLAT")

@@ -2,6 +2,21 @@
 
 #include "engines/rsm/gather_lib.glsl"
 
+// A sum of many terms to the last bit (W. Kahan, Comm. ACM 8(1), 1965): rounding must not choose which lights are tested.
+struct Sum {
+    float value;
+    float lost;
+};
+
+void sum_add(inout Sum sum, float x)
+{
+    precise float term = x - sum.lost;
+    precise float next = sum.value + term;
+    precise float gained = next - sum.value;
+    sum.lost = gained - term;
+    sum.value = next;
+}
+
 // All of them at a point that the eye sees, `to_eye` from it.
 //
 // Rays are what costs. Of more lights than VISIBILITY_RAYS, as many are tested, drawn by what they send (systematic resampling:
@@ -22,29 +37,29 @@ Gathered gather_vpls(vec3 position_ws, vec3 n, vec3 ng, vec3 to_eye)
 #endif
 #if HAS_OCCUPANCY && VISIBILITY_RAYS > 0
     float u = sobol_2d(view.subframe, 36u).x;
-    float total = 0.0;
+    Sum all = Sum(0.0, 0.0);
     Gathered open = g;   // Σ f − P
     for (int i = 0; i < vpl_count; ++i) {
         VplLight light = vpl_light(vpls[i], position_ws, n, ng, 1.0);
-        total += light.arriving;
+        sum_add(all, light.arriving);
         open.radiance += light.radiance;
         open.direction += vec4(light.direction, 1.0) * light.arriving;
 #ifdef GATHER_SLOPE
         g.slope += vec4(light.slope, luminance(light.radiance));
 #endif
     }
-    if (total <= 0.0) {
+    if (all.value <= 0.0) {
         return g;
     }
     int picked[VISIBILITY_RAYS];
     float shares[VISIBILITY_RAYS];
     int count = 0;
-    float share = total / float(VISIBILITY_RAYS);
-    float below = 0.0;
+    float share = all.value / float(VISIBILITY_RAYS);
+    Sum below = Sum(0.0, 0.0);
     float taken = 0.0; // shares that fell to the lights so far
     for (int i = 0; i < vpl_count; ++i) {
-        below += vpl_light(vpls[i], position_ws, n, ng, 1.0).arriving;
-        float reached = min(floor(below / share + u), float(VISIBILITY_RAYS));
+        sum_add(below, vpl_light(vpls[i], position_ws, n, ng, 1.0).arriving);
+        float reached = min(floor(below.value / share + u), float(VISIBILITY_RAYS));
         if (reached > taken && count < VISIBILITY_RAYS) {
             picked[count] = i;
             shares[count] = reached - taken;
