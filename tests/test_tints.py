@@ -139,3 +139,15 @@ def test_what_closes_a_volume_is_known_by_its_edges():
     assert set(np.abs(closed.outward)) == {1.0}
     scene.meshes[0].slots = np.array([[0, 0, len(scene.meshes[0].triangles) - 1]])
     assert set(Emitters.of(scene, emission).outward) == {0.0}
+
+
+def test_what_rough_glass_reflects_has_its_share_of_the_sub_frames(gl):
+    """Its refraction may pass all light while it reflects besides: by the rest alone, the reflection was drawn in next to no
+    sub-frame, and a thousand times too bright there (Glossy Color is at most 1 in expectation)."""
+    b = scenes.SceneBuilder("rough glass")
+    node = Node("BSDF_PRINCIPLED", "Glass", {"Base Color": (1.0,) * 3, "Transmission Weight": 1.0, "Roughness": 0.7, "IOR": 1.5})
+    b.add(scenes.sphere(1.0, 48, 24), Material("Glass", ShaderGraph((node,), Link(0, "BSDF"))))
+    b.light(scenes.sun_light((0.0, 1.0, -0.5), 1.0))
+    scene = b.build(scenes.perspective((0, -4, 0), (0, 0, 0), 0.6))
+    p = make(scene, "Glossy Color", samples=4, resolution=(64, 36), use_indirect_diffuse=False).passes
+    assert p["Glossy Color"].max() < 4.0

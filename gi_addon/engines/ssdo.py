@@ -227,7 +227,7 @@ _BOX = Uniform("ssdo_box", "vec4", "the rectangle of the screen that the scene's
 
 
 def _screen_box(frame: Frame, facts: Facts) -> tuple[float, float, float, float]:
-    """``ssdo_box`` of this sub-frame: with a pixel around for rounding, within what is drawn; all that where the eye is in it."""
+    """``ssdo_box`` of this sub-frame, within what is drawn; all that where the eye is in it."""
     width, height = facts.resolution
     corners = np.array([[(low, high)[k >> axis & 1] for axis, (low, high) in enumerate(zip(*facts.rig.bounds, strict=True))]
                         for k in range(8)])  # fmt: skip
@@ -235,7 +235,7 @@ def _screen_box(frame: Frame, facts: Facts) -> tuple[float, float, float, float]
     if (clip[:, 3] <= 1e-6 * facts.radius).any():
         return (0.0, 0.0, float(width), float(height))
     at = (clip[:, :2] / clip[:, 3:] * 0.5 + 0.5) * (width, height)
-    low, high = np.clip([at.min(axis=0) - 1.0, at.max(axis=0) + 1.0], 0.0, (width, height))
+    low, high = np.clip([at.min(axis=0), at.max(axis=0)], 0.0, (width, height))
     return (*low.tolist(), *high.tolist())
 
 

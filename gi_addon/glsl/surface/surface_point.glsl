@@ -71,7 +71,11 @@ float surface_opacity(Closure c)
     float through = max3(c.transparent);
     // What refracts or scatters on is shaded with its tint, and by the brightest channel no tint is over 1: behind many
     // panes or leaves the product of tints would be rare and huge. To light, what scatters on is as solid as paper.
-    through += max3(c.transmission + c.translucent);
+    // Rough glass may pass all and reflect besides: then what it reflects has its part of the sub-frames by its weight, and the
+    // tint makes up for it.
+    float passing = max3(c.transmission + c.translucent);
+    float reflected = max3(c.f0 + c.diffuse);
+    through += min(passing, (1.0 - through) * passing / max(passing + reflected, 1e-6));
 #elif SURFACE_SEE_THROUGH_GLASS > 1
     float through = max3(c.transparent + c.transmission);
 #elif SURFACE_SEE_THROUGH_GLASS

@@ -99,7 +99,8 @@ Covered scan_next(sampler2D planes, inout Scan scan, Slice slice, int k, vec4 en
     Covered r = Covered(a, vec2(1.0, 0.0), 0.0, 0u, 0u);
     float until = 1.0;
     if (k < scan.steps) {
-        b.s = mix(scan.pixel, 1.0, spacing(float(k), scan.steps, scan.jitter));
+        // The last one is a pixel before the end, which may be where the scene ends: of that pixel's surface is the rest.
+        b.s = mix(scan.pixel, max(1.0 - scan.pixel, scan.pixel), spacing(float(k), scan.steps, scan.jitter));
         b.pixel = ivec2(scan.origin.xy + scan.way * b.s);
         if (b.pixel == a.pixel) {
             scan.last = b;
