@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from .emitters import Emitters
 from .focus import Focus, find_focus
-from .lights import Emitters, LightRig, build_rig
+from .lights import LightRig, build_rig
 from .materials import CompiledGraph, Medium, mean_medium
 from .outputs import film_layers
 from .scene import CAMERA, CATCHER, Mesh, Scene
@@ -45,6 +46,7 @@ class Facts:
     visible: bool
     emissive: bool
     transparent: bool
+    tinted: bool  # some of what is see-through has a colour
     diffuse: bool
     glossy: bool
     transmissive: bool
@@ -121,6 +123,7 @@ def gather_facts(
     # Whatever looks at lit surfaces looks at the lights' bounce maps.
     bounced = s.use_indirect_diffuse or (s.use_glossy and any(c.glossy for c in some))
     bounced = bounced or (s.use_translucency and any(c.transmissive or c.subsurface for c in some))
+    tinted = any(compiled[m].tinted for m in {m for ms in scene.instances.materials for m in ms})
     from_screen = s.technique == "SSDO" and s.ssdo.sources == "SCREEN"
     rig = build_rig(
         scene.lights, focus,
@@ -130,7 +133,7 @@ def gather_facts(
         shadows=s.use_shadows and not (s.technique == "SSDO" and s.ssdo.shadows == "SCREEN"),
         bounces=s.bounces > 0 and bounced and s.technique != "SSDO",
         shadow_resolution=s.shadows.resolution, bounce_resolution=s.rsm.resolution,
-        world_resolution=s.world.resolution,
+        world_resolution=s.world.resolution, tinted=tinted,
     )  # fmt: skip
     medium, domains = mean_medium(scene.world.graph, scene.images), _domains(scene)
     if len(domains) > _MOST_DOMAINS:
@@ -149,6 +152,7 @@ def gather_facts(
         visible=bool(seen.any()) and scene.triangle_count() > 0,
         emissive=any(c.emissive for c in some),
         transparent=any(c.transparent or c.transmissive for c in some),
+        tinted=tinted,
         diffuse=any(c.diffuse or c.subsurface for c in some),
         glossy=any(c.glossy for c in some),
         transmissive=any(c.transmissive for c in some),

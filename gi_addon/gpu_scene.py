@@ -504,11 +504,13 @@ def material_source(compiled: CompiledGraph, units: int) -> str:
     return "\n".join(lines)
 
 
-def world_source(compiled: CompiledGraph, units: int, *, sun_disc: bool = True) -> str:
-    """``generated/world.glsl``: ``vec3 world_radiance(vec3 direction_ws)``; without ``sun_disc`` it leaves out suns that
-    are lights of their own."""
+def world_source(compiled: CompiledGraph, units: int, *, camera: bool, sun_disc: bool = True) -> str:
+    """``generated/world.glsl``: ``vec3 world_radiance(vec3 direction_ws)``, as the ``camera`` sees it or as what it lights
+    does; without ``sun_disc`` it leaves out suns that are lights of their own."""
     # Worlds are evaluated in compute shaders.
-    lines = [f"#define WORLD_SUN_DISC {int(sun_disc)}", "#define SURFACE_IMPLICIT_LOD 0", *_param_lines(compiled)]
+    lines = [f"#define WORLD_SUN_DISC {int(sun_disc)}", "#define SURFACE_IMPLICIT_LOD 0",
+             f"#define SURFACE_SEEN_BY_CAMERA {int(camera)}", "#define SURFACE_SEEN_BY_SHADOW 0",
+             *_param_lines(compiled)]  # fmt: skip
     lines += _image_lines(compiled, units)
     lines += ['#include "lib/surface_lib.glsl"', '#include "nodes/math.glsl"', '#include "nodes/color.glsl"',
               '#include "nodes/texture.glsl"', *_includes(compiled), compiled.glsl]  # fmt: skip

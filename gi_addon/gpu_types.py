@@ -38,6 +38,8 @@ LIGHT = struct(
     ("patch_radius", "f4"), ("spread_scale", "f4"), ("shape", "i4"), ("flags", "i4"),
     ("soft_radius2", "f4"), ("diffuse", "f4"), ("glossy", "f4"), ("receivers", "u4"),  # m², of a soft disc; sets lit
     ("salt", "u4"),  # of its own sequences; the points of one world or of all emissive meshes share theirs
+    # Blender's Light Falloff: the irradiance is that without, times distance^falloff · d²/(d² + smooth).
+    ("falloff", "f4"), ("falloff_smooth", "f4"),
 )  # fmt: skip
 LIGHT_SUN, LIGHT_POINT, LIGHT_SPOT, LIGHT_AREA, LIGHT_WORLD, LIGHT_MESH = range(6)
 LIGHT_FLAG_SHADOW, LIGHT_FLAG_BOUNCE, LIGHT_FLAG_CAMERA = 1, 2, 4

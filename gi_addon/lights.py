@@ -9,13 +9,12 @@ own; with one sub-frame every light is its centre.
 from __future__ import annotations
 
 import zlib
-from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 
 import numpy as np
 
 from . import atlas
+from .emitters import Emitters
 from .focus import Focus
 from .gpu_types import (
     LIGHT,
@@ -33,7 +32,7 @@ from .gpu_types import (
     SHAPE_ELLIPSE,
     SHAPE_RECTANGLE,
 )
-from .scene import DIFFUSE, EVERY_SET, Light, Scene
+from .scene import EVERY_SET, Light
 from .sequence import sobol_2d
 from .world_map import WorldMap
 
@@ -54,59 +53,6 @@ _FACES = np.array([
     [[1, 0, 0], [0, 0, 1], [0, -1, 0]],
     [[1, 0, 0], [0, 1, 0], [0, 0, -1]],
 ], "f8")  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Emitters:
-    """Emissive triangles of the scene: corners (T, 3, 3) world space, radiance (T, 3) W/(m²·sr) from both sides."""
-
-    corners: np.ndarray
-    radiance: np.ndarray
-
-    @staticmethod
-    def none() -> Emitters:
-        return Emitters(np.zeros((0, 3, 3)), np.zeros((0, 3)))
-
-    @staticmethod
-    def of(scene: Scene, emission: Sequence[np.ndarray]) -> Emitters:
-        """The emissive triangles of ``scene``; ``emission`` is the mean radiance (3,) of each material. Triangles
-        without area are left out."""
-        corners, radiance = [], []
-        inst = scene.instances
-        for i in range(len(inst)):
-            mesh, used = scene.meshes[inst.mesh[i]], inst.materials[i]
-            if not inst.visibility[i] & DIFFUSE or not np.isfinite(inst.matrix[i]).all() or not used:
-                continue
-            for slot, first, count in mesh.slots:
-                value = emission[used[min(int(slot), len(used) - 1)]]
-                if count and (value > 0.0).any():
-                    triangles = mesh.positions[mesh.triangles[first : first + count]].astype("f8")
-                    corners.append(triangles @ inst.matrix[i, :3, :3].T + inst.matrix[i, :3, 3])
-                    radiance.append(np.broadcast_to(value, (count, 3)))
-        if not corners:
-            return Emitters.none()
-        found = Emitters(np.concatenate(corners), np.concatenate(radiance))
-        solid = found.areas() > 0.0
-        return Emitters(found.corners[solid], found.radiance[solid])
-
-    def __len__(self) -> int:
-        return len(self.corners)
-
-    def areas(self) -> np.ndarray:
-        """Triangle areas (T,), m²."""
-        a = self.corners[:, 1] - self.corners[:, 0]
-        b = self.corners[:, 2] - self.corners[:, 0]
-        return 0.5 * np.linalg.norm(np.cross(a, b), axis=1)
-
-    @cached_property
-    def share(self) -> np.ndarray:
-        """Each triangle's share (T,) of the luminous power, by which points are drawn."""
-        power = self.areas() * (self.radiance @ np.array([0.2126, 0.7152, 0.0722]))
-        return power / power.sum()
-
-    @cached_property
-    def cumulative(self) -> np.ndarray:
-        return np.cumsum(self.share)
 
 
 @dataclass
@@ -284,6 +230,7 @@ class LightRig:
             self._place_on_mesh(out, source, u, subframes)
             return
         out["diffuse"], out["glossy"] = light.visible_diffuse, light.visible_glossy
+        out["falloff"], out["falloff_smooth"] = light.falloff, light.falloff_smooth
         out["receivers"] = light.receivers
         matrix = light.matrix
         center = matrix[:3, 3]
@@ -446,10 +393,11 @@ def build_rig(
     shadow_resolution: int,
     bounce_resolution: int,
     world_resolution: int,
+    tinted: bool = False,
     texel_budget: int = 1 << 25,
 ) -> LightRig:
     """Collect what shines and lay out its maps. Lights without power, or with a broken transform, are left out with a
-    note."""
+    note. Where see-through surfaces are ``tinted`` every light has a shadow map of its own, which knows the tint."""
     sources: list[Source] = []
     notes: list[str] = []
     for index, light in enumerate(lights):
@@ -513,7 +461,7 @@ def build_rig(
         coarse = source.light is not None and coarser[source.seed] > 0
         # What the light lights but is not shaded by is in its bounce map too.
         linked = source.light is not None and source.light.blockers != EVERY_SET
-        return not (drawn_anew and bounce_resolution >= shadow_resolution and not coarse and not linked)
+        return not (drawn_anew and bounce_resolution >= shadow_resolution and not coarse and not linked and not tinted)
 
     return LightRig(
         sources, focus, world, emitters,

@@ -48,6 +48,7 @@ OUTPUTS: dict[str, Output] = {
                "transmission_color"),
         Output("Transmission Color", "TransCol", "RGB", "COLOR", "use_pass_transmission_color", ("transmission_color",)),
         Output("Volume Direct", "VolumeDir", "RGB", "COLOR", "cycles.use_pass_volume_direct", ("volume_direct",)),
+        Output("Volume Indirect", "VolumeInd", "RGB", "COLOR", "cycles.use_pass_volume_indirect", ("volume_indirect",)),
         Output("Emission", "Emit", "RGB", "COLOR", "use_pass_emit", ("emission",)),
         Output("Environment", "Env", "RGB", "COLOR", "use_pass_environment", ("environment",)),
         Output("Ambient Occlusion", "AO", "RGB", "COLOR", "use_pass_ambient_occlusion", ("ao",)),
@@ -69,39 +70,43 @@ LONG_NAMES = {o.short: o.name for o in OUTPUTS.values()}
 #   transmission.direct                   light from behind through translucent surfaces, tinted; alpha 1 where there are any
 #   transmission.indirect                 radiance that arrives through them, tinted, where the technique knows it (alpha 1);
 #                                         elsewhere they show what is straight behind
+#   gbuffer.tint                          share of what is behind that coloured transparent surfaces leave
 #   volume.light                          radiance scattered towards the eye in front of the surface; alpha: the mean share
 #                                         of the light behind that still passes
+#   volume.indirect                       the same of light that surfaces or the air have scattered before, where the technique
+#                                         knows it
 #   volume.transmittance                  that share by colour, where the technique knows it
 #   direct.shadow                         share of the direct irradiance that is not blocked: what a shadow catcher shows
 LAYERS: dict[str, tuple[str, ...]] = {
     "combined": (
         "gbuffer.depth", "gbuffer.diffuse", "gbuffer.emission", "direct.diffuse", "direct.glossy", "reflected.sources",
         "indirect.diffuse", "indirect.glossy", "gbuffer.transmission", "transmission.direct", "transmission.indirect",
-        "volume.light",
-        "volume.transmittance", "subsurface.direct", "subsurface.indirect", "direct.shadow",
+        "volume.light", "volume.indirect", "volume.transmittance", "gbuffer.tint", "subsurface.direct", "subsurface.indirect",
+        "direct.shadow",
     ),
     "depth": ("gbuffer.depth",),
     "normal": ("gbuffer.depth", "gbuffer.normal"),
     "diffuse_direct": ("gbuffer.depth", "gbuffer.diffuse", "direct.diffuse", "subsurface.direct", "gbuffer.transmission",
-                       "transmission.direct", "volume.transmittance"),
+                       "transmission.direct", "volume.transmittance", "gbuffer.tint"),
     "diffuse_indirect": ("gbuffer.depth", "gbuffer.diffuse", "indirect.diffuse", "subsurface.indirect", "gbuffer.transmission",
-                         "transmission.direct", "transmission.indirect", "volume.transmittance"),
+                         "transmission.direct", "transmission.indirect", "volume.transmittance", "gbuffer.tint"),
     "diffuse_color": ("gbuffer.depth", "gbuffer.diffuse", "gbuffer.transmission", "transmission.direct",
-                      "volume.transmittance"),
-    "glossy_direct": ("gbuffer.depth", "direct.glossy", "reflected.sources", "volume.transmittance"),
-    "glossy_indirect": ("gbuffer.depth", "indirect.glossy", "volume.transmittance"),
+                      "volume.transmittance", "gbuffer.tint"),
+    "glossy_direct": ("gbuffer.depth", "direct.glossy", "reflected.sources", "volume.transmittance", "gbuffer.tint"),
+    "glossy_indirect": ("gbuffer.depth", "indirect.glossy", "volume.transmittance", "gbuffer.tint"),
     "glossy_color": ("gbuffer.depth", "gbuffer.normal", "gbuffer.specular", "gbuffer.lobe", "brdf.albedo",
-                     "brdf.average", "brdf.energy", "volume.transmittance"),
+                     "brdf.average", "brdf.energy", "volume.transmittance", "gbuffer.tint"),
     "transmission_direct": ("gbuffer.depth", "gbuffer.transmission", "gbuffer.diffuse", "gbuffer.emission",
                             "direct.diffuse", "direct.glossy", "reflected.sources", "transmission.direct",
-                            "volume.transmittance"),
+                            "volume.transmittance", "gbuffer.tint"),
     "transmission_indirect": ("gbuffer.depth", "gbuffer.transmission", "gbuffer.diffuse", "gbuffer.emission",
                               "direct.diffuse", "direct.glossy", "reflected.sources", "indirect.diffuse", "indirect.glossy",
-                              "transmission.direct", "transmission.indirect", "volume.transmittance"),
-    "transmission_color": ("gbuffer.depth", "gbuffer.transmission", "volume.transmittance"),
+                              "transmission.direct", "transmission.indirect", "volume.transmittance", "gbuffer.tint"),
+    "transmission_color": ("gbuffer.depth", "gbuffer.transmission", "volume.transmittance", "gbuffer.tint"),
     "volume_direct": ("volume.light",),
-    "emission": ("gbuffer.depth", "gbuffer.emission", "volume.transmittance"),
-    "environment": ("gbuffer.depth", "volume.transmittance"),
+    "volume_indirect": ("volume.indirect",),
+    "emission": ("gbuffer.depth", "gbuffer.emission", "volume.transmittance", "gbuffer.tint"),
+    "environment": ("gbuffer.depth", "volume.transmittance", "gbuffer.tint"),
     "ao": ("gbuffer.depth", "ao"),
     "shadow": ("gbuffer.depth", "direct.shadow"),
 }  # fmt: skip

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from .emitters import Emitters
 from .engines import TECHNIQUES
 from .facts import Facts, gather_facts
 from .focus import Focus, find_focus
@@ -23,9 +24,9 @@ from .gl.timers import PassTimers
 from .gpu_scene import GPUScene, world_source
 from .gpu_types import GENERATED, VIEW
 from .graph import Plan, plan
-from .lights import Emitters
 from .materials import CompiledGraph, compile_surface, compile_world, mean_emission
 from .outputs import OUTPUTS, develop
+from .passes.surface_points import surface_points
 from .scene import Camera, Scene
 from .settings import Settings
 from .world_map import WorldMap
@@ -34,6 +35,8 @@ from .world_map import WorldMap
 _CHECK_EACH_PASS = bool(os.environ.get("QUARTET_CHECK_GL"))
 # The world's map to draw directions from; 256 × 128 resolves a sun of 1.4°, smaller ones are spread over that.
 _WORLD_MAP = (256, 128)
+# Points of the scene's surfaces that emissive triangles are drawn to serve.
+_RECEIVERS = 128
 
 
 class RenderError(RuntimeError):
@@ -307,7 +310,7 @@ class Renderer:
             "World Map",
             {"compute": "passes/world_map_comp.glsl"},
             prelude={"compute": "layout(binding = 0, rgba32f) writeonly uniform image2D world_map;"},
-            virtual={**GENERATED, "generated/world.glsl": world_source(world, 0, sun_disc=False)},
+            virtual={**GENERATED, "generated/world.glsl": world_source(world, 0, camera=False, sun_disc=False)},
         )
         texture = self.gl.texture("world map", _WORLD_MAP, "rgba32f")
         # Image look-ups take their level of detail from the view.
@@ -341,7 +344,10 @@ def find_emitters(scene: Scene, compiled: list[CompiledGraph]) -> Emitters:
         mean_emission(m.graph, scene.images) if c.emissive else np.zeros(3)
         for m, c in zip(scene.materials, compiled, strict=True)
     ]
-    return Emitters.of(scene, emission) if any((e > 0.0).any() for e in emission) else Emitters.none()
+    if not any((e > 0.0).any() for e in emission):
+        return Emitters.none()
+    points = surface_points(scene, _RECEIVERS, 1)
+    return Emitters.of(scene, emission, points["position_ws"][points["area"] > 0.0].astype("f8"))
 
 
 def render(

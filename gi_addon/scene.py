@@ -164,6 +164,7 @@ class Light:
     shines along -Z. ``radius``: soft size in m (POINT, SPOT);
     ``angle``: full angular diameter (SUN), rad; ``spot_size`` full cone angle, rad; ``size`` (2,): width and height in
     object units; ``spread``: rad.
+    ``falloff``: the irradiance is that of the distance's square × distance^falloff, × d²/(d² + ``falloff_smooth``), m².
     ``receivers``, ``blockers``: bit k says whether objects of set k are lit, and shade (``receiver_set``, ``blocker_set``).
     """
 
@@ -185,6 +186,8 @@ class Light:
     visible_glossy: bool = True
     receivers: int = (1 << 32) - 1
     blockers: int = (1 << 32) - 1
+    falloff: float = 0.0
+    falloff_smooth: float = 0.0
 
 
 @dataclass

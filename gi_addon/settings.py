@@ -266,7 +266,7 @@ class VCTSettings:
         higher="thinner walls hold, finer bounce light", lower="faster, less memory",
     )  # fmt: skip
     cones: int = _setting(
-        12, "Cones", "Cones traced from each point into its hemisphere and sub-frame", low=1, high=64,
+        6, "Cones", "Cones traced from each point into its hemisphere and sub-frame", low=1, high=64,
         higher="finer directions, sharper contact", lower="faster, blurrier",
     )  # fmt: skip
     shadow_cones: bool = _setting(
@@ -315,7 +315,8 @@ class Settings:
         higher="brighter interiors", lower="0 is direct light only",
     )  # fmt: skip
     gather_scale: int = _setting(
-        4, "Gather Scale", "Pixels per side of one low-resolution gather; the rest is interpolated where surfaces agree",
+        4, "Gather Scale", "Pixels per side of one low-resolution gather; the rest is interpolated where surfaces agree. With "
+        "voxel cones no more than a 72nd of the picture's height",
         low=1, high=16, unit="px", higher="faster", lower="less blur; 1 gathers at every pixel",
     )  # fmt: skip
     pixel_filter: str = _setting(

@@ -1,15 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""LPV on scenes made by code against one diffuse bounce of Cycles: the numbers of docs/techniques/lpv.md.
+"""LPV on scenes made by code against one bounce of Cycles, pass by pass: the numbers of docs/techniques/lpv.md.
 
-``.venv/bin/python scripts/score_lpv.py`` prints a table: empty Cornell boxes under a spot and an area light, over grid
-resolutions.
+``.venv/bin/python scripts/score_lpv.py --cases blocks,fog --sweep lpv.resolution=16,32 --times`` prints a line per case, setting
+and pass, gain and errors, and with ``--times`` what each of LPV's passes cost.
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
-import time
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
@@ -31,44 +30,68 @@ def emissive_box():
     return b.build(scene.camera)
 
 
-def main() -> None:
-    import gi_addon
+def cases() -> dict[str, tuple]:
+    """Name -> (scene, passes compared)."""
     from gi_addon.compare import scenes
+
+    fog = scenes.cornell()
+    fog.world = scenes.fog(0.4)
+    surfaces = ("Diffuse Direct", "Diffuse Indirect", "Ambient Occlusion", "Combined")
+    return {
+        "empty": (scenes.cornell(blocks=False), ("Diffuse Indirect",)),
+        "empty-area": (scenes.cornell(blocks=False, light="area"), ("Diffuse Indirect",)),
+        "blocks": (scenes.cornell(), surfaces),
+        "blocks-area": (scenes.cornell(light="area"), surfaces),
+        "glowing": (emissive_box(), ("Combined",)),
+        "fog": (fog, ("Volume Direct", "Volume Indirect", "Diffuse Indirect", "Combined")),
+        **{name: (scenes.effect(name), passes) for name, passes in (
+            ("glossy", ("Glossy Indirect",)), ("translucency", ("Combined",)), ("area_lights", ("Combined",)))},
+    }  # fmt: skip
+
+
+def reference(scene, names, samples: int, seed: int):
+    """Passes of one diffuse bounce by Cycles: name -> (H, W, 3). In fog exactly one event follows the first, as with LPV's."""
+    from gi_addon.host import build, cycles
+
+    made = build.build(scene)
+    made.render.resolution_x, made.render.resolution_y, made.render.resolution_percentage = *SIZE, 100
+    cycles.set_up(made, cycles.Reference(1, samples, seed))
+    if "Volume Indirect" in names:
+        made.cycles.max_bounces = 1
+    return {name: image[..., :3] for name, image in cycles.render_passes(made, names).items()}
+
+
+def main() -> None:
+    import bpy  # noqa: F401 — before the add-on
+
+    import gi_addon
     from gi_addon.compare.metrics import score
     from gi_addon.compare.sheet import comparison
-    from gi_addon.host import build, cycles
-    from gi_addon.renderer import render
-    from gi_addon.settings import Settings
+    from gi_addon.compare.studio import Studio, settings_for
 
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--samples", type=int, default=256)
-    parser.add_argument("--resolutions", default="16,32,48")
+    parser.add_argument("--cases", default="empty,empty-area,blocks-area,glowing")
+    parser.add_argument("--samples", type=int, default=256, help="of each half of the reference")
+    parser.add_argument("--sweep", default="lpv.resolution=32", help="a setting and its values")
+    parser.add_argument("--times", action="store_true")
     parser.add_argument("-o", "--output")
     arguments = parser.parse_args()
     gi_addon.register()
-    rows = []
-    cases = (
-        ("empty, spot", scenes.cornell(blocks=False), "Diffuse Indirect"),
-        ("empty, area light", scenes.cornell(blocks=False, light="area"), "Diffuse Indirect"),
-        ("blocks, area light", scenes.cornell(light="area"), "Diffuse Indirect"),
-        ("glowing block", emissive_box(), "Combined"),
-    )
-    for name, scene, wanted in cases:
-        halves = []
-        for seed in (1, 2):
-            made = build.build(scene)
-            made.render.resolution_x, made.render.resolution_y, made.render.resolution_percentage = *SIZE, 100
-            cycles.set_up(made, cycles.Reference(1, arguments.samples, seed))
-            halves.append(cycles.render_passes(made, (wanted,))[wanted][..., :3])
-        for resolution in (int(r) for r in arguments.resolutions.split(",")):
-            settings = Settings()
-            settings.set("technique", "LPV")
-            settings.set("lpv.resolution", resolution)
-            start = time.perf_counter()
-            image = render(scene, settings, (wanted,), resolution=SIZE, subframes=8).passes[wanted][..., :3]
-            seconds = time.perf_counter() - start
-            print(f"{name} {resolution}: {score(image, *halves).text()}, {seconds:.1f} s", flush=True)
-        rows.append((name, image, (halves[0] + halves[1]) / 2))
+    path, _, values = arguments.sweep.partition("=")
+    found, rows = cases(), []
+    for case in arguments.cases.split(","):
+        scene, names = found[case]
+        a, b = (reference(scene, names, arguments.samples, seed) for seed in (1, 2))
+        for value in (int(v) for v in values.split(",")):
+            with Studio() as studio:
+                settings = settings_for("LPV", **{path.replace(".", "__"): value})
+                result = studio.render(scene, settings, names, SIZE, subframes=8, timed=arguments.times)
+            for name in names:
+                found_score = score(result.passes[name][..., :3], a[name], b[name])
+                print(f"{case}, {path} {value}, {name}: {found_score.text()}, {result.seconds:.1f} s", flush=True)
+            for title, spent in result.milliseconds.items():
+                print(f"    {title}: {sum(spent):.0f} ms in {len(spent)} runs", flush=True)
+        rows += [(f"{case} {name}", result.passes[name][..., :3], (a[name] + b[name]) / 2) for name in names]
     if arguments.output:
         comparison(arguments.output, rows, ("LPV", "Cycles R1"))
     gi_addon.unregister()

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """SSDO on scenes made by code against one bounce of Cycles: the numbers of docs/techniques/ssdo.md.
 
-``.venv/bin/python scripts/score_ssdo.py indirect mirrors occlusion translucency`` prints tables; ``-o FOLDER`` writes sheets.
+``.venv/bin/python scripts/score_ssdo.py indirect mirrors occlusion translucency sweep`` prints tables; ``-o FOLDER`` writes
+sheets. ``time`` prints what each pass takes, without a reference; ``--scene FILE.npz`` of a snapshot in place of the Cornell box.
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -78,27 +78,68 @@ def cases(what: str):
             scene.world.ao_distance = distance
             for kind in ("MITTRING", "BITMASK"):
                 yield f"Cornell box, {distance:g} m", scene, "Ambient Occlusion", {"ssdo.occlusion": kind}
+    elif what == "sweep":
+        for name in ("cornell", "corridor"):
+            scene = getattr(scenes, name)()
+            for samples in (50, 100, 200, 400):
+                yield name, scene, "Diffuse Indirect", {"ssdo.samples": samples, "ssdo.steps": 25}
     else:
         yield "refraction and subsurface", scenes.effect("translucency"), "Combined", {}
 
 
-def main() -> None:
-    import gi_addon
-    from gi_addon.compare.metrics import score
-    from gi_addon.compare.sheet import comparison
-    from gi_addon.compare.visible_light import visible_light
-    from gi_addon.host import build, cycles
-    from gi_addon.renderer import render
+def settings_of(values: dict):
+    """SSDO's settings with ``values`` by dotted name."""
     from gi_addon.settings import Settings
 
+    settings = Settings()
+    for path, value in {"technique": "SSDO", **values}.items():
+        settings.set(path, value)
+    return settings
+
+
+def print_times(scene, subframes: int, values: dict, size=(320, 180), rounds: int = 3) -> None:
+    """Milliseconds a sub-frame of each pass of Combined (the least of ``rounds`` frames), and in units of direct lighting."""
+    from gi_addon.compare.studio import Studio
+
+    best: dict[str, float] = {}
+    with Studio() as studio:
+        for _ in range(rounds + 1):  # the first compiles
+            result = studio.render(scene, settings_of(values), ("Combined",), size, subframes=subframes, timed=True)
+            found = {name: sum(ms) / subframes for name, ms in result.milliseconds.items()}
+            best = {name: min(ms, best.get(name, ms)) if _ else ms for name, ms in found.items()}
+    unit = best["Direct Lighting Computation"]
+    for name, ms in sorted(best.items(), key=lambda item: -item[1]):
+        print(f"{name}: {ms:.2f} ms, {ms / unit:.2f}")
+    print(f"all: {sum(best.values()):.1f} ms", flush=True)
+
+
+def main() -> None:
+    import gi_addon
+    from gi_addon.compare import scenes
+    from gi_addon.compare.metrics import score
+    from gi_addon.compare.sheet import comparison
+    from gi_addon.compare.studio import Studio
+    from gi_addon.compare.visible_light import visible_light
+    from gi_addon.host import build, cycles
+    from gi_addon.scene import Scene
+
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("tables", nargs="+", choices=("indirect", "mirrors", "occlusion", "translucency"))
+    tables = ("indirect", "mirrors", "occlusion", "translucency", "sweep", "time")
+    parser.add_argument("tables", nargs="+", choices=tables)
+    parser.add_argument("--scene", type=Path, help="snapshot (quartet snapshot) for the table time; else the Cornell box")
+    parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE")
     parser.add_argument("--samples", type=int, default=8, help="sub-frames")
     parser.add_argument("--reference-samples", type=int, default=256)
     parser.add_argument("-o", "--output", type=Path)
     arguments = parser.parse_args()
     gi_addon.register()
+    studio = Studio()
+    given = dict(assignment.split("=", 1) for assignment in arguments.set)
     for table in arguments.tables:
+        if table == "time":
+            scene = Scene.load(arguments.scene) if arguments.scene else scenes.cornell()
+            print_times(scene, arguments.samples, given)
+            continue
         rows, halves, last = [], [], None
         for name, scene, wanted, values in cases(table):
             if name != last:
@@ -111,20 +152,21 @@ def main() -> None:
                     if table == "mirrors":
                         made.cycles.caustics_reflective = False  # which only add noise to it
                     halves.append(cycles.render_passes(made, (wanted,))[wanted][..., :3])
-            settings = Settings()
-            settings.set("technique", "SSDO")
-            for path, value in values.items():
-                settings.set(path, value)
-            start = time.perf_counter()
-            image = render(scene, settings, (wanted,), resolution=SIZE, subframes=arguments.samples).passes[wanted][..., :3]
-            seconds = time.perf_counter() - start
+            settings = settings_of({**values, **given})
+            result = studio.render(scene, settings, (wanted,), SIZE, subframes=arguments.samples)
+            image = result.passes[wanted][..., :3]
+            if table == "sweep":  # again, with all programs built
+                rounds = [studio.render(scene, settings, (wanted,), SIZE, subframes=arguments.samples) for _ in range(3)]
+                result = min(rounds, key=lambda r: r.seconds)
             known = f", known {visible_light(scene, settings).known:.3f}" if table == "indirect" else ""
             chosen = ", ".join(f"{k} {v}" for k, v in values.items())
-            print(f"{name} [{chosen}]: {score(image, *halves).text()}{known}, {seconds:.1f} s", flush=True)
+            ms = 1000.0 * result.seconds / arguments.samples
+            print(f"{name} [{chosen}]: {score(image, *halves).text()}{known}, {ms:.1f} ms a sub-frame", flush=True)
             rows.append((f"{name} {chosen}", image, (halves[0] + halves[1]) / 2))
         if arguments.output:
             arguments.output.mkdir(parents=True, exist_ok=True)
             comparison(arguments.output / f"{table}.png", rows, ("SSDO", "Cycles R1"))
+    studio.close()
     gi_addon.unregister()
 
 

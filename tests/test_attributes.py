@@ -53,6 +53,42 @@ def test_an_instance_takes_the_attribute_of_its_instancer_and_the_scene_gives_it
     agree("instancer", scene, ("Diffuse Color",))
 
 
+def test_geometry_nodes_give_each_instance_its_own_attribute_and_random_number(blender, gl):
+    """Coloured by an attribute of the instances in one half, by Object Info's Random in the other; two materials serve all."""
+    from gi_addon.host.sync import SceneSync
+
+    bpy = blender
+    scene = plane(bpy)
+    child = cube(bpy, scene, (0.0, 0.0, -9.0), 0.4, coloured_by(bpy, "INSTANCER", "tint"))
+    tree = child.data.materials[0].node_tree
+    info, mix = tree.nodes.new("ShaderNodeObjectInfo"), tree.nodes.new("ShaderNodeMixRGB")
+    attribute, shader = tree.nodes["Attribute"], tree.nodes["Diffuse BSDF"]
+    tree.links.new(attribute.outputs["Color"], mix.inputs["Color1"])
+    tree.links.new(info.outputs["Random"], mix.inputs["Color2"])
+    tree.links.new(mix.outputs["Color"], shader.inputs["Color"])
+    bpy.ops.mesh.primitive_plane_add(size=1.0, location=(0.0, 0.0, 0.3))
+    nodes = bpy.data.node_groups.new("Instances", "GeometryNodeTree")
+    nodes.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    new, end = nodes.nodes.new, nodes.nodes.new("NodeGroupOutput")
+    grid, place, store = new("GeometryNodeMeshGrid"), new("GeometryNodeInstanceOnPoints"), new("GeometryNodeStoreNamedAttribute")
+    source, number = new("GeometryNodeObjectInfo"), new("FunctionNodeRandomValue")
+    for socket, value in zip(grid.inputs, (3.0, 2.0, 4, 3), strict=False):
+        socket.default_value = value
+    source.inputs["Object"].default_value = child
+    store.data_type, store.domain, number.data_type = "FLOAT_COLOR", "INSTANCE", "FLOAT_VECTOR"
+    store.inputs["Name"].default_value = "tint"
+    links = nodes.links.new
+    links(grid.outputs["Mesh"], place.inputs["Points"])
+    links(source.outputs["Geometry"], place.inputs["Instance"])
+    links(place.outputs[0], store.inputs["Geometry"])
+    links(number.outputs[0], next(i for i in store.inputs if i.name == "Value" and i.enabled))
+    links(store.outputs[0], end.inputs[0])
+    bpy.context.object.modifiers.new("Instances", "NODES").node_group = nodes
+    agree("instances", scene, ("Diffuse Color",))
+    worn = SceneSync().read(blender.context.evaluated_depsgraph_get())
+    assert len({m for used in worn.instances.materials for m in used}) == 3 and len(worn.instances) >= 12
+
+
 def test_pointiness_is_cycles(blender, gl):
     """Sharp, hollow and flat places of a bent grid."""
     bpy = blender

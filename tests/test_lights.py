@@ -9,10 +9,11 @@ from conftest import make
 
 from gi_addon import atlas
 from gi_addon.compare import scenes
+from gi_addon.emitters import Emitters
 from gi_addon.focus import Focus
 from gi_addon.gl import shared
 from gi_addon.gpu_types import LIGHT_WORLD
-from gi_addon.lights import Emitters, build_rig, spread_profile
+from gi_addon.lights import build_rig, spread_profile
 from gi_addon.materials.ies import mean_strength
 from gi_addon.renderer import Renderer
 from gi_addon.settings import Settings

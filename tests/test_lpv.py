@@ -478,6 +478,79 @@ def fog(density):
     return make_fog(density, color=(0.0, 0.0, 0.0), kind="VOLUME_ABSORPTION")
 
 
+def air_of(lit, density):
+    """(Volume Indirect, exact) in a sphere of albedo ``lit`` full of fog that scatters isotropically, a lamp in its middle."""
+    from test_volumetric import fog as make_fog
+
+    scene, size = scenes.integrating_sphere(albedo=lit, power=100.0), (32, 18)
+    scene.world = make_fog(density)
+    image = make(scene, "Volume Indirect", technique="LPV", samples=4, resolution=size).passes["Volume Indirect"][..., 0]
+    mu, mu_weight = np.polynomial.legendre.leggauss(96)
+    u, u_weight = (v / 2 for v in np.polynomial.legendre.leggauss(64))
+    # Mean radiance at distance r from the middle: the walls' B e^(−σd), and what the air on the way scatters of the lamp's
+    # light, by points equiangular about the lamp.
+    wall = lit * 100.0 / (4 * np.pi) / np.pi * np.exp(-density)
+    r = np.linspace(1e-3, 0.999, 60)[:, None]
+    far = -r * mu + np.sqrt(1.0 - (r * (1.0 - mu) * r * (1.0 + mu)))
+    near = r * np.sqrt(1.0 - mu**2)
+    low, high = np.arctan(r * mu / near), np.arctan((far + r * mu) / near)
+    angle = low[..., None] + (u + 0.5) * (high - low)[..., None]
+    s = near[..., None] * np.tan(angle) - (r * mu)[..., None]
+    ds = near[..., None] / np.cos(angle) ** 2 * u_weight * (high - low)[..., None]
+    lamp = near[..., None] / np.cos(angle)
+    scattered = density * 100.0 * np.exp(-density * (lamp + s)) / (4 * np.pi * lamp) ** 2 * ds
+    mean = ((wall * np.exp(-density * far) + scattered.sum(-1)) * mu_weight / 2).sum(-1)
+    origin, ray = camera_rays(scene.camera, size)
+    ray /= np.linalg.norm(ray, axis=-1, keepdims=True)
+    b = (origin * ray).sum(-1)
+    end = -b + np.sqrt(b * b - (origin**2).sum(-1) + 1.0)
+    t = end[..., None] * (u + 0.5)
+    at = np.linalg.norm(origin[..., None, :] + t[..., None] * ray[..., None, :], axis=-1)
+    return image, (density * np.exp(-density * t) * np.interp(at, r[:, 0], mean) * u_weight * end[..., None]).sum(-1)
+
+
+@pytest.mark.parametrize(("lit", "density"), [(0.5, 0.01), (0.0, 0.5)])
+def test_the_air_scatters_the_light_of_walls_and_of_the_air_to_the_eye(gl, lit, density):
+    """Volume Indirect against a double integral: nearly all from lit walls, then all from lit air, between black walls."""
+    image, exact = air_of(lit, density)
+    assert image.mean() == pytest.approx(exact.mean(), rel=0.06)
+    assert np.mean((image - exact) ** 2 / (exact**2 + (0.1 * exact.mean()) ** 2)) < 0.004
+
+
+def test_forward_scattering_air_shows_more_light_against_it(gl):
+    """Air before a lit wall that scatters forward is brighter seen against the wall's light than one that scatters evenly, by
+    Σ g^l (2l + 1) P_l(cosθ), and one that scatters backward darker."""
+    from test_volumetric import fog as make_fog
+
+    means = []
+    for g in (0.0, 0.6, -0.6):
+        b = scenes.SceneBuilder()
+        b.quads(np.array([[[-1, 1, -1], [1, 1, -1], [1, 1, 1], [-1, 1, 1]]], "f8"), scenes.diffuse((0.8,) * 3))
+        b.light(scenes.spot_light((0, 0.9, 0), (0, 1, 0), 100.0, size=1.2, blend=0.0))
+        scene = b.build(scenes.perspective((0, -0.5, 0), (0, 1, 0), 0.2, clip=(0.01, 9.0)), make_fog(0.05, anisotropy=g))
+        image = make(scene, "Volume Indirect", technique="LPV", samples=1, resolution=(16, 9)).passes["Volume Indirect"]
+        means.append(float(image.mean()))
+    # cosθ = .72, half way from the edge of the wall seen from d = 1/2 to its middle: 1 ± 3 · .6 cosθ + 5 · .36 P₂ is 2.8 and .2.
+    assert means[1] > 1.7 * means[0] > 0.0
+    assert 0.0 < means[2] < 0.5 * means[0]
+
+
+@pytest.mark.parametrize(("change", "runs"), [({}, True), ({"use_volumetric": False}, False), ({"bounces": 0}, False)])
+def test_in_scattering_costs_nothing_where_there_is_none(change, runs):
+    from test_volumetric import fog as make_fog
+
+    chosen = Settings()
+    for name, value in ({"technique": "LPV"} | change).items():
+        chosen.set(name, value)
+    clear, foggy, smoky = (scenes.cornell() for _ in range(3))
+    foggy.world, smoky.world = make_fog(0.2), fog(0.2)
+    made = {"LPV In-scattering", "LPV Air Volume"}
+    titles = [{p.title for p in inspect(s, chosen, ("Combined",), resolution=SMALL).run} & made for s in (foggy, smoky, clear)]
+    assert titles[0] == (made if runs else set())
+    assert titles[1] == ({"LPV Air Volume"} if runs else set())  # it only absorbs
+    assert titles[2] == set()
+
+
 @pytest.mark.parametrize(
     ("setting", "gone"),
     [

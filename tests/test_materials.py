@@ -151,6 +151,39 @@ def test_an_invisible_world_lights_but_does_not_show(blender, gl):
     agree("world", scene, ("Combined",), rel_mse=0.05, gain=0.06)
 
 
+def test_the_camera_sees_another_world_than_lights_the_scene(blender, gl):
+    """Mixed by the Light Path node, as backdrops are; a transparent film keeps the pass and empties the picture."""
+    plain = scenes.plane_scene(scenes.sun_light((0.3, 0.5, -1.0), 1.0))
+    plain.world = scenes.world((0.5, 0.6, 0.9))
+    scene = put(blender, plain, size=SIZE, samples=8)
+    scene.camera.rotation_euler.x += 0.25
+    scene.render.film_transparent = True
+    tree = scene.world.node_tree
+    path, mix, seen = (tree.nodes.new(f"ShaderNode{kind}") for kind in ("LightPath", "MixShader", "Background"))
+    seen.inputs["Color"].default_value = (0.9, 0.1, 0.1, 1.0)
+    lights = next(n for n in tree.nodes if n.type == "BACKGROUND" and n != seen)
+    tree.links.new(path.outputs["Is Camera Ray"], mix.inputs[0])
+    tree.links.new(lights.outputs[0], mix.inputs[1])
+    tree.links.new(seen.outputs[0], mix.inputs[2])
+    tree.links.new(mix.outputs[0], next(n for n in tree.nodes if n.type == "OUTPUT_WORLD").inputs["Surface"])
+    agree("backdrop", scene, ("Combined", "Diffuse Direct", "Environment"), rel_mse=0.05, gain=0.06)
+
+
+def test_portals_and_a_layer_without_sky_give_no_light(blender, gl):
+    """An area light that is a portal, and a world that the view layer leaves out: what is lit is what the sun lights."""
+    plain = scenes.plane_scene(scenes.sun_light((0.3, 0.5, -1.0), 1.0))
+    plain.world = scenes.world((0.5, 0.6, 0.9))
+    scene = put(blender, plain, size=SIZE, samples=8)
+    data = blender.data.lights.new("portal", "AREA")
+    data.energy, data.cycles.is_portal = 500.0, True
+    portal = blender.data.objects.new("portal", data)
+    portal.location = (0.0, 0.0, 2.0)
+    scene.collection.objects.link(portal)
+    scene.camera.rotation_euler.x += 0.25
+    blender.context.view_layer.use_sky = False
+    agree("portal", scene, ("Combined",), samples=16)
+
+
 def test_light_sees_only_the_lobes_it_may(blender, gl):
     """A light off for diffuse, one off for glossy."""
     bpy = blender

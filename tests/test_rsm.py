@@ -368,7 +368,8 @@ def test_a_pane_shows_what_is_behind_it(gl):
     pane = scenes.mesh_from_quads(scenes.box_quads((-0.6, -0.05, -0.5), (0.6, 0.05, 0.5)))
     options = {"samples": 8, "resolution": (64, 36)}
     plain = make(scenes.cornell(blocks=False), "Combined", **options).passes["Combined"][..., :3]
-    window = (slice(14, 22), slice(26, 38))
+    # Above row 18 the wall behind has no light but bounced: docs/techniques/rsm.md says what a real pane shows of that.
+    window = (slice(14, 18), slice(26, 38))
     for ior, low, high in ((1.0001, 0.97, 1.03), (1.45, 0.85, 1.05)):
         scene = with_object(scenes.cornell(blocks=False), pane, glass(ior), (0, -0.3, 1.0))
         p = make(scene, "Combined", "Transmission Indirect", "Transmission Color", **options).passes

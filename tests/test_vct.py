@@ -14,6 +14,7 @@ from gi_addon.gl import GL, shared
 from gi_addon.outputs import OUTPUTS
 from gi_addon.passes.voxels import VoxelGrid, voxel_grid
 from gi_addon.renderer import Renderer, inspect
+from gi_addon.scene import Link, Material, Node, ShaderGraph
 from gi_addon.settings import Settings, walk
 
 
@@ -226,7 +227,7 @@ def test_a_lamp_close_to_a_floor_lights_it_and_hides_what_is_below(gl, cells, up
     b.quads((lamp if up else lamp[::-1])[None], scenes.emissive((1, 1, 1), 10.0))
     b.quads(np.array([[[-0.5, -0.5, 1.5], [-0.5, 0.5, 1.5], [0.5, 0.5, 1.5], [0.5, -0.5, 1.5]]]), scenes.diffuse((0.5,) * 3))
     scene = b.build(scenes.perspective((0, 0, 0.9), (0, 0.001, 1.5), 0.9))
-    image = vct(scene, "Diffuse Indirect", samples=16, resolution=(32, 18)).passes["Diffuse Indirect"]
+    image = vct(scene, "Diffuse Indirect", samples=16, resolution=(32, 18), vct__cones=12).passes["Diffuse Indirect"]
     edge = np.sinh(np.linspace(-3.0, 3.0, 161))
     edge *= 2.0 / edge[-1]
     middle, width = (edge[1:] + edge[:-1]) / 2, np.diff(edge)
@@ -467,3 +468,37 @@ def test_shared_cones_add_no_light_and_lose_none(gl):
     exact = wall_reference(scene.camera, (64, 36), floor, 0.8 * 5.0)
     image = vct(scene, "Diffuse Indirect", samples=8, resolution=(64, 36), use_ao=False).passes["Diffuse Indirect"][..., 0]
     assert abs(np.nansum(np.where(np.isnan(exact), np.nan, image)) / np.nansum(exact) - 1.0) <= 0.03
+
+
+@pytest.mark.parametrize("power", [1e-9, 1e9])
+def test_light_of_any_power_next_to_a_wall_stays_finite_and_in_proportion(gl, power):
+    """Volumes hold half floats; a lamp a fifth of a cell above a floor lights a ceiling in proportion to its power, to 1e-3."""
+
+    def ceiling(watts):
+        b = scenes.SceneBuilder()
+        b.quads(np.array([[[-2.0, -2, 0], [2, -2, 0], [2, 2, 0], [-2, 2, 0]]]), scenes.diffuse((0.8,) * 3))
+        b.quads(np.array([[[-0.5, -0.5, 1.5], [-0.5, 0.5, 1.5], [0.5, 0.5, 1.5], [0.5, -0.5, 1.5]]]), scenes.diffuse((0.5,) * 3))
+        b.light(scenes.point_light((0.0, 0.0, 0.2 * 4.0 / 31.0), watts))
+        scene = b.build(scenes.perspective((0, 0, 0.9), (0, 0.001, 1.5), 0.9))
+        return vct(scene, "Diffuse Indirect", samples=1, resolution=(32, 18), vct__resolution=32).passes["Diffuse Indirect"]
+
+    one, other = ceiling(1.0), ceiling(power)
+    assert one.mean() > 1e-4
+    np.testing.assert_allclose(other / power, one, rtol=1e-3)
+
+
+def test_light_through_a_translucent_sheet_leaves_its_far_side(gl):
+    """A sheet of transmittance T in the sun lights a floor in its own shade: E/π at a point is T E_sun/π of the sheet's form
+    factor there, ± 5 %. The other share goes nowhere: what the sheet sends back lights nothing here."""
+    through = Material("Paper", ShaderGraph((Node("BSDF_TRANSLUCENT", "Paper", {"Color": (0.6, 0.3, 0.1)}),), Link(0, "BSDF")))
+    sheet = np.array([[-1.0, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]])
+    b = scenes.SceneBuilder().quads(sheet[None], through)
+    b.quads(np.array([[[-0.5, -0.5, 0.0], [0.5, -0.5, 0], [0.5, 0.5, 0], [-0.5, 0.5, 0]]]), scenes.diffuse((0.5,) * 3))
+    b.light(scenes.sun_light((0.0, 0.0, -1.0), 4.0))
+    scene = b.build(scenes.orthographic((0, 0, 0.5), (0, 0.001, 0), 0.9, aspect=16 / 9))
+    image = vct(scene, "Diffuse Indirect", samples=8, resolution=(32, 18)).passes["Diffuse Indirect"]
+    x, y = np.meshgrid((np.arange(32) + 0.5) / 32 - 0.5, ((np.arange(18) + 0.5) / 18 - 0.5) * 9 / 16)
+    points = np.stack([0.9 * x, 0.9 * y, 0 * x], -1)
+    form = polygon_form_factor(points.reshape(-1, 3), np.broadcast_to([0.0, 0, 1], (x.size, 3)), sheet)
+    exact = 4.0 / np.pi * form.mean() * np.array([0.6, 0.3, 0.1])
+    np.testing.assert_allclose(image.mean(axis=(0, 1)), exact, rtol=0.05)

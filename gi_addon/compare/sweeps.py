@@ -14,7 +14,7 @@ from .studio import has_setting, settings_for
 AXES: dict[str, dict[str, tuple]] = {
     "RSM": {"rsm.samples": (50, 200, 800), "gather_scale": (4, 1), "rsm.visibility": ("CELLS", "NONE"), "bounces": (1, 3)},
     "LPV": {"lpv.resolution": (16, 32, 64), "lpv.directions": ("48", "72"), "bounces": (1, 3)},
-    "VCT": {"vct.resolution": (32, 64, 128), "vct.cones": (6, 16), "bounces": (1, 3)},
+    "VCT": {"vct.resolution": (32, 64, 128), "vct.cones": (3, 12), "bounces": (1, 3)},
     "SSDO": {"ssdo.samples": (64, 256), "ssdo.steps": (16, 32), "ssdo.layers": (1, 2, 3), "gather_scale": (4, 1),
              "bounces": (1, 3)},
 }

@@ -8,6 +8,7 @@ the scene's geometry, and looked up at each pixel.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import permutations, product
 
 import moderngl
@@ -21,8 +22,8 @@ from ..nested_grids import MOST_GRIDS, Grid, grids_needed, nested_grids
 from ..passes.ao import AOBlur
 from ..passes.brdf_tables import BRDFTables
 from ..passes.direct_lighting import DirectLighting, TranslucentLighting
-from ..passes.gbuffer import GBuffer, TranslucentBack, TranslucentLayer, TranslucentTint
-from ..passes.lights import LightList, RSMGeneration, ShadowMaps
+from ..passes.gbuffer import CameraTint, GBuffer, TranslucentBack, TranslucentLayer, TranslucentTint
+from ..passes.lights import LightList, RSMGeneration, ShadowMaps, ShadowTint
 from ..passes.occupancy import CELL_UNIFORMS, Occupancy, set_cells
 from ..passes.reflections import GLOSSY_RAY, GLOSSY_TRACED, reflection_sharing
 from ..passes.resolve import Resolve
@@ -38,7 +39,7 @@ from ..passes.screen import (
     no_indirect,
 )
 from ..passes.subsurface import Subsurface, SubsurfaceBack
-from ..passes.volumetric import MEDIUM_UNIFORMS, Volumetric, air, medium_defines, set_medium
+from ..passes.volumetric import MEDIUM_UNIFORMS, Volumetric, air, medium_defines, no_air, set_medium, step_turn
 from ..passes.world_guide import WorldGuide
 from ..passes.world_rays import WorldRays
 from ..scene import SHADOW
@@ -68,10 +69,13 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         WorldGuide(),
         LightList(),
         ShadowMaps(),
+        ShadowTint(),
         RSMGeneration(),
         GeometryInjection(),
+        AirVolume(),
         injection,
         GBuffer(),
+        CameraTint(),
         TranslucentLayer(),
         TranslucentBack(),
         TranslucentTint(),
@@ -88,6 +92,7 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         *reflection_sharing(settings),
         Refraction(),
         Volumetric(),
+        InScattering(),
         Resolve(layers),
     ]
 
@@ -100,12 +105,24 @@ def grid_count(facts: Facts) -> int:
     chosen = facts.settings.lpv
     if chosen.iterations:
         return 1
-    return grids_needed(facts.focus, chosen.resolution) if chosen.cascades == "AUTO" else int(chosen.cascades)
+    if chosen.cascades != "AUTO":
+        return int(chosen.cascades)
+    return min(grids_needed(facts.focus, chosen.resolution) + int(_endless(facts)), MOST_GRIDS)
+
+
+def _endless(facts: Facts) -> bool:
+    """Whether air that scatters goes on outside of the scene."""
+    return any(domain.unit_from_world is None and max(domain.medium.scattering) > 0.0 for domain in air(facts))
 
 
 def grids(facts: Facts) -> list[Grid]:
     """The frame's grids, the outermost first."""
-    return nested_grids(facts.focus, facts.settings.lpv.resolution, grid_count(facts), facts.eye)
+    focus = facts.focus
+    if _endless(facts) and grid_count(facts) > 1:
+        # One more around all, of cells twice as wide and as many of them: what the scene sends out lights the air before it.
+        margin = 0.5 * float((focus.region[1] - focus.region[0]).max())
+        focus = replace(focus, region=focus.region + margin * np.array([[-1.0], [1.0]]))
+    return nested_grids(focus, facts.settings.lpv.resolution, grid_count(facts), facts.eye)
 
 
 def grid(facts: Facts) -> Grid:
@@ -237,8 +254,42 @@ def _batch(facts: Facts) -> int:
 # --- passes -----------------------------------------------------------------------------------------------------------
 
 
+class AirVolume(Pass):
+    """What light meets in the air of each cell."""
+
+    title = "LPV Air Volume"
+    figure = "LPV Propagation"
+    writes = (
+        Texture("lpv.air", "lpv_air", "per cell the air's extinction, 1/m; its scattering, 1/m, and mean cosine", "rgba32f",
+                lambda f: _size(f, 2), access="readwrite"),
+    )  # fmt: skip
+    uniforms = (*_GRID, *MEDIUM_UNIFORMS)
+    shaders = {"main": {"compute": "engines/lpv/medium_comp.glsl"}}
+    depends = ("world", "transforms", "materials")
+    settings = ("lpv.resolution", "lpv.cascades", *_AIR_SETTINGS)
+
+    def place(self, facts: Facts) -> tuple:
+        return _place(facts)
+
+    def rate(self, facts: Facts) -> str:
+        return "static"
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return {**_defines(facts), **medium_defines(facts)}
+
+    def absent(self, facts: Facts) -> str | None:
+        return no_air(facts)
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        program = frame.program(planned)
+        set_medium(frame, program, planned.facts)
+        for g in grids(planned.facts):
+            _set_grid(frame, program, g)
+            frame.compute(planned, program, g.size, (4, 4, 4))
+
+
 class RadianceInjection(Pass):
-    """Flux that the RSMs' texels reflect, into the cells in front of them.
+    """Flux that the RSMs' texels reflect, into the cells in front of them, and what the air scatters of their rays.
 
     Lights that are another point in each sub-frame are summed over the sub-frames so far; ``count`` says how many.
     """
@@ -261,6 +312,7 @@ class RadianceInjection(Pass):
     )
     shaders = {
         "main": {"compute": "engines/lpv/inject_comp.glsl"},
+        "scatter": {"compute": "engines/lpv/scatter_comp.glsl"},
         "source": {"compute": "engines/lpv/source_comp.glsl"},
     }
     depends = ("lights", "world", "transforms", "meshes", "materials")
@@ -286,17 +338,27 @@ class RadianceInjection(Pass):
         inject, source = frame.program(planned), frame.program(planned, "source")
         sample = frame.light_sample(bounce=True)
         flux = frame.resources["lpv.flux"]
-        set_medium(frame, inject, facts)
+        programs = [inject]
+        if scatters(facts):
+            programs.append(frame.program(planned, "scatter"))
+        for program in programs:
+            set_medium(frame, program, facts)
         self.count = 1 if planned.stale or frame.subframe == 0 else self.count + 1
         for g in grids(facts):
             for first, (scale, lights) in enumerate(fixed_point_groups(sample.lights, g.cell)):
                 flux.clear()
                 for tile, view in enumerate(sample.views):
                     if int(view["light"]) in lights:
-                        _set_grid(frame, inject, g, tile=tile, fixed_scale=scale)
-                        frame.compute(planned, inject, (int(view["rect"][2]), int(view["rect"][3])))
+                        for program in programs:
+                            _set_grid(frame, program, g, tile=tile, fixed_scale=scale)
+                            frame.compute(planned, program, (int(view["rect"][2]), int(view["rect"][3])))
                 _set_grid(frame, source, g, fixed_scale=scale, first_group=int(first == 0 and self.count == 1))
                 frame.compute(planned, source, (*g.size[:2], g.size[2] * SH_COUNT), (4, 4, 4))
+
+
+def scatters(facts: Facts) -> bool:
+    """Whether there is air that scatters."""
+    return any(max(domain.medium.scattering) > 0.0 for domain in air(facts))
 
 
 def fixed_point_groups(lights: np.ndarray, cell: float) -> list[tuple[float, set[int]]]:
@@ -338,7 +400,7 @@ class GeometryInjection(Pass):
                "vec4", np.dtype(("f4", (4,))), lambda f: _cells(f) * 3),
         Buffer("lpv.faces", "lpv_faces", "per cell and axis: covered points, fragments, sums of their places and normals",
                "uint", np.dtype("u4"), lambda f: _most_cells(f) * 15, scratch=True),
-        Buffer("lpv.albedo", "lpv_albedo", "per cell and axis: mean of albedo over |n|₁ (a float's bits), red, green, blue",
+        Buffer("lpv.albedo", "lpv_albedo", "per cell and axis: mean of albedo (a float's bits), red, green, blue",
                "uint", np.dtype("u4"), lambda f: _cells(f) * 9,
                when=_no_albedo),
         Texture("lpv.raster", "lpv_raster", "what the surfaces are drawn to; nobody reads it", "r8",
@@ -427,9 +489,6 @@ class Propagation(Pass):
         Uniform("fixed_scale", "float", "units of fixed point per W"),
         Uniform("source_scale", "float", "one over the sub-frames that the sources are summed over"),
         Uniform("bounced", "int", "1 to start from what the walls reflect too"),
-        Uniform("medium_extinction", "vec3", "share of light lost per metre of the air"),
-        Uniform("medium_scattering", "vec3", "share of light scattered per metre"),
-        Uniform("medium_anisotropy", "float", "mean cosine of the scattering angle"),
         Uniform("inner_size", "ivec3", "cells along each axis of the grid within this one"),
         Uniform("inner_column", "int", "where they begin along x in textures"),
         Uniform("inner_low", "ivec3", "where it begins, in cells of this one"),
@@ -451,12 +510,14 @@ class Propagation(Pass):
 
     def __init__(self, injection: RadianceInjection, bounces: int = 1, iterations: int = 0) -> None:
         self.injection = injection
-        self.reads = ("lpv.source", Optional("lpv.walls"))
+        self.reads = ("lpv.source", Optional("lpv.walls"), Optional("lpv.air"))
         if bounces > 1:
             self.reads += (Optional("lpv.albedo"),)
             self.writes += (
                 Texture("lpv.bounced", "lpv_bounced", "lpv.source and what the walls reflect of the volume's light", "rgba32f",
                         _sh_size, access="readwrite", scratch=True),
+                Texture("lpv.absorbed", "lpv_absorbed", "flux that ends at the walls of each cell, over h², W/m²", "rgba32f",
+                        lambda f: _size(f, 1), access="readwrite", scratch=True),
                 Buffer("lpv.reflected", "lpv_reflected", "what the walls reflect in fixed point: cell, harmonic, colour", "int",
                        np.dtype("i4"), lambda f: _most_cells(f) * SH_COUNT * 3, scratch=True),
             )  # fmt: skip
@@ -474,8 +535,9 @@ class Propagation(Pass):
 
     def defines(self, facts: Facts) -> dict[str, int]:
         return {
-            "HAS_LPV_BOUNCED": int(facts.settings.bounces > 1), "LPV_LIMITED": int(facts.settings.lpv.iterations > 0),
-            **_defines(facts), **medium_defines(facts),
+            "HAS_LPV_BOUNCED": int(facts.settings.bounces > 1), "HAS_LPV_ABSORBED": int(facts.settings.bounces > 1),
+            "LPV_LIMITED": int(facts.settings.lpv.iterations > 0),
+            **_defines(facts),
         }  # fmt: skip
 
     def place(self, facts: Facts) -> tuple:
@@ -487,15 +549,6 @@ class Propagation(Pass):
             return
         table = ordinates(ordinate_count(facts))
         frame.upload("lpv.ordinates", table)
-        filled = air(facts)
-        if filled:
-            medium = filled[0].medium
-            for key in ("main", "bounced") if planned.has("lpv.albedo") else ("main",):
-                frame.set(
-                    frame.program(planned, key),
-                    medium_extinction=tuple(float(v) for v in medium.extinction),
-                    medium_scattering=tuple(float(v) for v in medium.scattering), medium_anisotropy=float(medium.anisotropy),
-                )  # fmt: skip
         self._carry(frame, planned, table, bounced=False)
         if planned.has("lpv.albedo"):
             reflect, bounced = frame.program(planned, "reflect"), frame.program(planned, "bounced")
@@ -573,6 +626,35 @@ class IndirectLighting(ScreenPass):
 
     def prepare(self, frame: Frame, planned: Planned, program) -> None:
         _set_grids(frame, program, planned.facts)
+
+
+class InScattering(ScreenPass):
+    """The volume's light that the air scatters to the eye."""
+
+    title = "LPV In-scattering"
+    figure = "Volumetric Lighting Computation"
+    reads = ("lpv.volume", Optional("lpv.walls"), Optional("gbuffer.depth"))
+    writes = (
+        Texture("volume.indirect", "volume_indirect", "radiance of surfaces and of the air that it scatters towards the eye, "
+                "W/(m²·sr)", "rgba32f", _screen),
+    )  # fmt: skip
+    uniforms = (
+        *_GRIDS, *MEDIUM_UNIFORMS,
+        Uniform("step_count", "int", "points on each ray"),
+        Uniform("step_turn", "float", "where in its stratum each point lies in this sub-frame, [0, 1)"),
+    )  # fmt: skip
+    fragment = "engines/lpv/inscatter_frag.glsl"
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return {**_defines(facts, chooses=True), **medium_defines(facts)}
+
+    def absent(self, facts: Facts) -> str | None:
+        return no_air(facts) or no_bounce(facts) or (None if scatters(facts) else "the air only absorbs")
+
+    def prepare(self, frame: Frame, planned: Planned, program) -> None:
+        facts = planned.facts
+        set_medium(frame, program, facts)
+        _set_grids(frame, program, facts, step_count=facts.settings.volume.samples, step_turn=step_turn(frame))
 
 
 def _march_steps(facts: Facts) -> int:

@@ -19,8 +19,8 @@ from ..graph import Buffer, Optional, Pass, Planned, Texture, Uniform
 from ..passes.ao import AOBlur, AOGeneration
 from ..passes.brdf_tables import BRDFTables
 from ..passes.direct_lighting import DirectLighting, TranslucentLighting
-from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint, gather_size
-from ..passes.lights import LightList, RSMGeneration, ShadowMaps
+from ..passes.gbuffer import CameraTint, GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint, gather_size
+from ..passes.lights import LightList, RSMGeneration, ShadowMaps, ShadowTint
 from ..passes.occupancy import CELL_UNIFORMS, Occupancy, set_cells
 from ..passes.reflections import GLOSSY_RAY, GLOSSY_TRACED, reflection_sharing
 from ..passes.resolve import Resolve
@@ -49,10 +49,12 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         WorldGuide(),
         LightList(),
         ShadowMaps(),
+        ShadowTint(),
         RSMGeneration(),
         RSMFlux(),
         SurfacePoints(),
         GBuffer(),
+        CameraTint(),
         RSMImportance(settings),
         RSMSamplingPattern(settings),
         TranslucentLayer(),

@@ -22,8 +22,8 @@ from ..graph import Optional, Pass, Planned, Texture, Uniform, glsl_name
 from ..passes.ao import AOBlur, AOGeneration
 from ..passes.brdf_tables import BRDFTables
 from ..passes.direct_lighting import DirectLighting, TranslucentLighting
-from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint
-from ..passes.lights import LightList, ShadowMaps
+from ..passes.gbuffer import CameraTint, GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint
+from ..passes.lights import LightList, ShadowMaps, ShadowTint
 from ..passes.occupancy import Occupancy
 from ..passes.reflections import GLOSSY_RAY, GLOSSY_TRACED, reflection_sharing
 from ..passes.resolve import Resolve
@@ -65,6 +65,7 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         WorldGuide(),
         LightList(),
         ShadowMaps(),
+        ShadowTint(),
         GBuffer(),
         TranslucentTint(),
         GBufferMips(),
@@ -83,6 +84,7 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         Reflections(),
         *reflection_sharing(settings),
         *reflection_sharing(settings, SOURCES_TRACED, REFLECTED_SOURCES, "SHARED_SOURCES"),
+        CameraTint(),
         TranslucentLayer(),
         TranslucentBack(),
         TranslucentLighting(),
@@ -225,7 +227,7 @@ _BOX = Uniform("ssdo_box", "vec4", "the rectangle of the screen that the scene's
 
 
 def _screen_box(frame: Frame, facts: Facts) -> tuple[float, float, float, float]:
-    """``ssdo_box`` of this sub-frame: with a pixel around for rounding, within what is drawn; all that where the eye is in it."""
+    """``ssdo_box`` of this sub-frame, within what is drawn; all that where the eye is in it."""
     width, height = facts.resolution
     corners = np.array([[(low, high)[k >> axis & 1] for axis, (low, high) in enumerate(zip(*facts.rig.bounds, strict=True))]
                         for k in range(8)])  # fmt: skip
@@ -233,7 +235,7 @@ def _screen_box(frame: Frame, facts: Facts) -> tuple[float, float, float, float]
     if (clip[:, 3] <= 1e-6 * facts.radius).any():
         return (0.0, 0.0, float(width), float(height))
     at = (clip[:, :2] / clip[:, 3:] * 0.5 + 0.5) * (width, height)
-    low, high = np.clip([at.min(axis=0) - 1.0, at.max(axis=0) + 1.0], 0.0, (width, height))
+    low, high = np.clip([at.min(axis=0), at.max(axis=0)], 0.0, (width, height))
     return (*low.tolist(), *high.tolist())
 
 
@@ -502,7 +504,7 @@ def _world(frame: Frame, planned: Planned, wanted: bool) -> Iterator[dict[str, s
         return
     frame.gpu.bind_world_params()
     frame.gpu.bind_images(frame.gpu.world, units)
-    yield {"generated/world.glsl": world_source(frame.gpu.world, units)}
+    yield {"generated/world.glsl": world_source(frame.gpu.world, units, camera=False)}
     frame.gpu.unbind_images(units, len(frame.gpu.world.images))
 
 

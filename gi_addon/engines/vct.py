@@ -8,13 +8,25 @@ direction; whatever a surface needs to know of the rest of the scene is gathered
 
 from __future__ import annotations
 
+import numpy as np
+
 from ..facts import Facts
 from ..frame import Frame
 from ..graph import Optional, Pass, Planned, Texture, Uniform
+from ..lights import Source, spread_profile
 from ..passes.brdf_tables import BRDFTables
 from ..passes.direct_lighting import DirectLighting, TranslucentLighting
-from ..passes.gbuffer import GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint, gather_size
-from ..passes.lights import LightList, RSMGeneration, ShadowMaps
+from ..passes.gbuffer import (
+    CameraTint,
+    GBuffer,
+    GBufferMips,
+    TranslucentBack,
+    TranslucentLayer,
+    TranslucentTint,
+    gather_scale,
+    gather_size,
+)
+from ..passes.lights import LightList, RSMGeneration, ShadowMaps, ShadowTint
 from ..passes.occupancy import Occupancy
 from ..passes.reflections import GLOSSY_RAY, GLOSSY_TRACED, reflection_sharing
 from ..passes.resolve import Resolve
@@ -46,11 +58,12 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         Occupancy(),
         WorldGuide(),
         LightList(),
-        *([] if settings.vct.shadow_cones else [ShadowMaps()]),
+        *([] if settings.vct.shadow_cones else [ShadowMaps(), ShadowTint()]),
         RSMGeneration(),
         Voxelisation(),
         RadianceInjection(),
         GBuffer(),
+        CameraTint(),
         TranslucentLayer(),
         TranslucentBack(),
         TranslucentTint(),
@@ -77,8 +90,58 @@ def _unlit(facts: Facts) -> str | None:
     return no_bounce(facts) or (None if facts.lit or facts.glowing_voxels else "no light shines")
 
 
+# The largest number that half floats hold, and how many sheets of a cell send light by their backs into one texel.
+_HALF_END, _SHEETS = 65504.0, 6
+
+
+def _irradiance_near(source: Source, distance: float) -> float:
+    """The most of a lamp's irradiance, W/m², at ``distance`` m from its point."""
+    light = source.light
+    emission = float(np.abs(light.emission).max())
+    if light.kind == "SUN":
+        return emission
+    if light.kind != "AREA":
+        return emission / (4.0 * np.pi * distance**2)
+    tan, scale = spread_profile(0.5 * light.spread)
+    return emission / (np.pi * distance**2) * (tan * scale if tan > 0.0 else 1.0)
+
+
+def radiance_unit(facts: Facts) -> float:
+    """What 1 in the volumes of light stands for, W/(m²·sr). They hold half floats, and a lamp of any power may stand before a
+    wall: with all lights a square of a sheet's width, ¼ cell, away from white, at every bounce, none is past the end. A power of
+    two, so that light scales by it exactly."""
+    near = 0.25 * voxel_grid(facts).cell
+    irradiance = sum(_irradiance_near(s, near) for s in facts.rig.sources if s.light is not None)
+    if facts.rig.world is not None:
+        irradiance += float((facts.rig.world.radiance.max(axis=-1) * facts.rig.world.solid_angle).sum())
+    emitters = facts.emitters
+    most = 0.0
+    if len(emitters):
+        brightest = emitters.radiance.max(axis=-1)
+        if facts.glowing_voxels:
+            most = float(brightest.max())
+        else:
+            irradiance += float(brightest @ emitters.areas()) / near**2
+    most = max((irradiance / np.pi + most) * max(facts.settings.bounces, 1), np.finfo("f4").tiny)
+    return float(2.0 ** np.ceil(np.log2(most * _SHEETS / _HALF_END)))
+
+
 def _one_bounce(facts: Facts) -> str | None:
     return None if facts.settings.bounces > 1 else "one bounce needs no other"
+
+
+# What the volumes of light are read by.
+_LIGHT_UNIFORMS = (
+    *GRID_UNIFORMS,
+    Uniform("grid_levels", "float", "mips above the cells"),
+    Uniform("radiance_unit", "float", "what 1 in the volumes of light stands for, W/(m²·sr)"),
+)
+
+
+def _light_uniforms(facts: Facts) -> dict:
+    """Values of _LIGHT_UNIFORMS."""
+    grid = voxel_grid(facts)
+    return {**grid.uniforms(), "grid_levels": float(grid.levels), "radiance_unit": radiance_unit(facts)}
 
 
 class RadianceInjection(Pass):
@@ -92,7 +155,7 @@ class RadianceInjection(Pass):
         Optional("rsm.depth"), Optional("rsm.albedo"), Optional("rsm.normal"), Optional("rsm.lights"), Optional("rsm.views"),
     )  # fmt: skip
     writes = (
-        Texture("vct.radiance", "voxel_radiance", "by side and axis: radiance × alpha, W/(m²·sr), that leaves the front of the "
+        Texture("vct.radiance", "voxel_radiance", "by side and axis: radiance × alpha, in units, that leaves the front of the "
                 "sheet; alpha, the share of the cell's face that it covers", "rgba16f", voxel_atlas,
                 mips=lambda f: voxel_grid(f).levels, filter="linear", scratch=True),
         Texture("vct.back", "voxel_back", "radiance × alpha, W/(m²·sr), that leaves sheets by their backs; alpha, the sum of "
@@ -104,12 +167,12 @@ class RadianceInjection(Pass):
                 lambda f: voxel_grid(f).size, when=_one_bounce, scratch=True),
     )  # fmt: skip
     uniforms = (
-        *GRID_UNIFORMS,
-        Uniform("grid_levels", "float", "mips above the cells"),
+        *_LIGHT_UNIFORMS,
         Uniform("cone_count", "int", "cones that each cell gathers by"),
         Uniform("view_count", "int", "reflective shadow maps in the list"),
         Uniform("first_time", "int", "1 when empty cells are due too"),
         Uniform("add_bounce", "int", "1 when later bounces are known"),
+        Uniform("emission_scale", "float", "radiance of the brightest emitter, in units of the volumes"),
         *MEDIUM_UNIFORMS,
     )
     shaders = {
@@ -132,15 +195,17 @@ class RadianceInjection(Pass):
         program = frame.program(planned)
         values = {
             "view_count": len(planned.facts.rig.bounce.sizes), "first_time": int(planned.stale),
-            "grid_levels": float(grid.levels), "cone_count": planned.facts.settings.vct.cones, **grid.uniforms(),
+            "cone_count": planned.facts.settings.vct.cones, **_light_uniforms(planned.facts),
         }  # fmt: skip
+        emitters = planned.facts.emitters
+        brightest = float(emitters.radiance.max()) if len(emitters) else 0.0
         again = planned.facts.settings.bounces - 1 if planned.has("vct.bounce") else 0
         for k in range(again + 1):
             if k:
                 self._bounce(frame, planned, grid, values)
                 frame.resources["vct.bounce"].use(12)
                 frame.resources["vct.bounce_back"].use(13)
-            frame.set(program, add_bounce=int(k > 0), **values)
+            frame.set(program, add_bounce=int(k > 0), emission_scale=brightest / values["radiance_unit"], **values)
             set_medium(frame, program, planned.facts)
             frame.compute(planned, program, grid.size, (4, 4, 4))
             build_mips(frame, planned, grid)
@@ -172,26 +237,21 @@ def build_mips(frame: Frame, planned: Planned, grid: VoxelGrid) -> None:
 # What cones read.
 _VOLUMES = ("vct.radiance", "vct.back", "voxels.sheets", "voxels.extents", "voxels.kinds")
 _CONE_UNIFORMS = (
-    *GRID_UNIFORMS,
-    Uniform("grid_levels", "float", "mips above the cells"),
+    *_LIGHT_UNIFORMS,
     Uniform("cone_count", "int", "cones per point and sub-frame"),
     Uniform("cone_sets", "float", "sub-frames, whose sets of cones share the hemisphere"),
 )
 
 
 def _set_cones(frame: Frame, program, facts: Facts) -> None:
-    grid = voxel_grid(facts)
-    frame.set(
-        program, **grid.uniforms(), grid_levels=float(grid.levels), cone_count=facts.settings.vct.cones,
-        cone_sets=float(facts.subframes),
-    )  # fmt: skip
+    frame.set(program, **_light_uniforms(facts), cone_count=facts.settings.vct.cones, cone_sets=float(facts.subframes))
 
 
 _BLOCKS = ("gbuffer.low_depth", "gbuffer.low_normal", "gbuffer.low_pixel")
 
 
 def _hits_defines(facts: Facts) -> dict[str, int]:
-    return {"GATHER_SCALE": facts.settings.gather_scale, "CONES": facts.settings.vct.cones}
+    return {"GATHER_SCALE": gather_scale(facts), "CONES": facts.settings.vct.cones}
 
 
 class ConeHits(Pass):

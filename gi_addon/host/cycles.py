@@ -51,6 +51,7 @@ def set_up(scene: bpy.types.Scene, how: Reference) -> None:
     # R1 is one diffuse and one glossy bounce; the camera's own ray to a surface is not a bounce, its reflection is one.
     c.max_bounces = how.bounces + 1 if how.bounces == 1 else how.bounces
     c.transmission_bounces = max(how.bounces, 1)
+    c.volume_bounces = how.bounces
     c.use_fast_gi = False
 
 

@@ -406,8 +406,11 @@ def read_light(data: bpy.types.Light, images: ImageTable) -> ShaderGraph:
 
 
 def default_material() -> Material:
-    """What Blender shows where a surface has no material: grey, diffuse."""
-    return Material("No Material", ShaderGraph((Node("BSDF_DIFFUSE", "", {"Color": (0.8, 0.8, 0.8)}),), Link(0, "BSDF")))
+    """What Cycles shows where a surface has no material: grey, Principled as it is added since Blender 5, diffuse before."""
+    if bpy.app.version < (5, 0, 0):
+        return Material("No Material", ShaderGraph((Node("BSDF_DIFFUSE", "", {"Color": (0.8, 0.8, 0.8)}),), Link(0, "BSDF")))
+    node = Node("BSDF_PRINCIPLED", "", {"Base Color": (0.8, 0.8, 0.8), "Roughness": 0.5, "IOR": 1.5})
+    return Material("No Material", ShaderGraph((node,), Link(0, "BSDF")))
 
 
 def holdout_material(material: Material) -> Material:

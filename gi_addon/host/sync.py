@@ -28,9 +28,11 @@ from ..scene import (
     Image,
     Instances,
     Light,
+    Link,
     Material,
     Mesh,
     Scene,
+    ShaderGraph,
     World,
     new_uid,
 )
@@ -147,13 +149,17 @@ class SceneSync:
             if index is None:
                 continue
             visibility = placed.visibility(obj, instance)
-            placed.add(index, matrix, tuple(materials.placed(m, instance, obj, bool(visibility & HOLDOUT)) for m in slots),
-                       visibility, _random(instance, obj), obj.pass_index, tuple(obj.color))  # fmt: skip
+            carried = materials.carried(slots) if instance.is_instance else None
+            color = tuple(obj.color) if carried is None else materials.values((carried,), instance, obj)[0]
+            held = bool(visibility & HOLDOUT)
+            placed.add(index, matrix, tuple(materials.placed(m, instance, obj, held, carried) for m in slots),
+                       visibility, _random(instance, obj), obj.pass_index, color)  # fmt: skip
         self._meshes = {k: v for k, v in self._meshes.items() if k in used_keys}
         for light, obj in lamps:
             light.receivers, light.blockers = placed.linking.masks(obj)
         scene.instances = placed.instances()
-        scene.world = self._read_world(getattr(layer, "world_override", None) or source.world, images)
+        sky = (getattr(layer, "world_override", None) or source.world) if layer.use_sky else None
+        scene.world = self._read_world(sky, images)
         sun = world_sun(scene.world.graph)
         if sun is not None and (sun.emission > 0.0).any():
             scene.lights.append(sun)
@@ -256,34 +262,53 @@ class _MaterialIndex:
         self._index: dict[tuple, int] = {}
         self._read: dict[int, Material] = {}
         self._asked: dict[int, tuple] = {}
+        self._given = attributes.PlacedAttributes()
 
     def index(self, material: bpy.types.Material | None) -> int:
         """Index of a material, attributes of objects being 0."""
         return self._variant(self.override or material, False, ())
 
-    def placed(self, material: bpy.types.Material | None, instance, obj: bpy.types.Object, held: bool) -> int:
-        """Index of a material as ``obj`` wears it; ``held``: of its variant that the camera sees as a hole."""
+    def placed(
+        self, material: bpy.types.Material | None, instance, obj: bpy.types.Object, held: bool,
+        carried: attributes.Name | None = None,
+    ) -> int:  # fmt: skip
+        """Index of a material as ``obj`` wears it; ``held``: of its variant that the camera sees as a hole; ``carried``: the
+        attribute that the instance brings itself."""
         material = self.override or material
-        names, _ = self.asks(material)
-        return self._variant(material, held, attributes.values_of(names, instance, obj, self.depsgraph) if names else ())
+        names = self.asks(material)[0]
+        if carried is not None and self.asks(material)[2] == carried:
+            return self._variant(material, held, (), carried=True)
+        return self._variant(material, held, self.values(names, instance, obj) if names else ())
 
-    def asks(self, material: bpy.types.Material | None) -> tuple[tuple[attributes.Name, ...], bool]:
-        """What a material wants to know of the object that wears it: attributes, and whether pointiness."""
+    def values(self, names: tuple[attributes.Name, ...], instance, obj: bpy.types.Object) -> tuple[attributes.Color, ...]:
+        """What the attributes ``names`` are for a placed object."""
+        return attributes.values_of(names, instance, obj, self.depsgraph, self._given)
+
+    def carried(self, slots: list) -> attributes.Name | None:
+        """The attribute that an instance with these materials brings itself, in place of its colour."""
+        asked = [self.asks(m) for m in slots]
+        return None if any(a[3] for a in asked) else next((a[2] for a in asked if a[2] is not None), None)
+
+    def asks(self, material: bpy.types.Material | None) -> tuple[tuple[attributes.Name, ...], bool, attributes.Name | None, bool]:
+        """What a material wants to know of the object that wears it: attributes, whether pointiness, the attribute that
+        instances can carry, and whether the object's colour."""
         material = self.override or material
         key = _uid(material)
         if key not in self._asked:
             graph = self._get(material).graph
-            self._asked[key] = (attributes.asked_of_objects(graph), graph.reads("NEW_GEOMETRY", "Pointiness"))
+            coloured = graph.reads("OBJECT_INFO", "Color") or graph.reads("OBJECT_INFO", "Alpha")
+            self._asked[key] = (attributes.asked_of_objects(graph), graph.reads("NEW_GEOMETRY", "Pointiness"),
+                                attributes.carried(graph), coloured)  # fmt: skip
         return self._asked[key]
 
-    def _variant(self, material, held: bool, values: tuple) -> int:
-        key = (_uid(material), held, values)
+    def _variant(self, material, held: bool, values: tuple, carried: bool = False) -> int:
+        key = (_uid(material), held, values, carried)
         if key not in self._index:
             found = self._get(material)
-            if held or values:
+            if held or values or carried:
                 old = self.sync._variants.get(key)
                 if old is None or old[0] is not found:
-                    old = self.sync._variants[key] = (found, _made_variant(found, held, values))
+                    old = self.sync._variants[key] = (found, _made_variant(found, held, values, carried))
                 found = old[1]
             self._index[key] = len(self.scene.materials)
             self.scene.materials.append(found)
@@ -321,7 +346,9 @@ def _uid(material: bpy.types.Material | None) -> int:
     return material.original.session_uid if material is not None else 0
 
 
-def _made_variant(material: Material, held: bool, values: tuple) -> Material:
+def _made_variant(material: Material, held: bool, values: tuple, carried: bool) -> Material:
+    if carried:
+        material = replace(material, graph=attributes.with_carried(material.graph), uid=new_uid())
     if values:
         material = replace(material, graph=attributes.with_values(material.graph, values), uid=new_uid())
     return holdout_material(material) if held else material
@@ -383,7 +410,7 @@ def _note(scene: Scene, text: str) -> None:
 def _random(instance: bpy.types.DepsgraphObjectInstance, obj: bpy.types.Object) -> float:
     """Object Info's Random in [0, 1]: Blender's own number for instances, for others Cycles' hash of the name."""
     if instance.is_instance:
-        return instance.random_id / 0xFFFFFFFF
+        return (instance.random_id & 0xFFFFFFFF) / 0xFFFFFFFF  # Blender shows 32 bits as a number with a sign
     key = 0
     for byte in obj.name.encode():
         key = (key * 37 + byte) & 0xFFFFFFFF
@@ -577,14 +604,19 @@ def _by_material(mesh, triangles: np.ndarray, triangle_count: int) -> tuple[np.n
 
 
 def _read_light(instance, obj: bpy.types.Object, notes: list[str], images: ImageTable) -> Light | None:
-    """A Light from Blender's, in Cycles' units."""
+    """A Light from Blender's, in Cycles' units; None of a portal, which shows Cycles where the sky is and gives no light."""
     data = obj.data
+    if data.type == "AREA" and getattr(data.cycles, "is_portal", False):
+        return None
     strength = float(data.energy) * 2.0 ** float(getattr(data, "exposure", 0.0))
     color = np.array(data.color, "f8")
     if getattr(data, "use_temperature", False):
         color = color * np.array(data.temperature_color, "f8")
+    falloff = (0.0, 0.0)
     if uses_nodes(data):
-        color = color * _light_nodes(data, notes, images)
+        graph = read_light(data, images)
+        color = color * _light_nodes(data.name, graph, notes, images)
+        falloff = _light_falloff(graph)
     matrix = np.array(instance.matrix_world, "f8")
     scale = [float(np.linalg.norm(matrix[:3, k])) for k in range(3)]
     light = Light(
@@ -593,6 +625,8 @@ def _read_light(instance, obj: bpy.types.Object, notes: list[str], images: Image
         visible_camera=bool(obj.visible_camera), visible_diffuse=bool(obj.visible_diffuse),
         visible_glossy=bool(obj.visible_glossy),
     )  # fmt: skip
+    if data.type != "SUN":  # from infinitely far away there is none
+        light.falloff, light.falloff_smooth = falloff
     if data.type in ("POINT", "SPOT"):
         light.radius = float(data.shadow_soft_size)
         light.soft_falloff = bool(getattr(data, "use_soft_falloff", False))
@@ -619,13 +653,23 @@ def _light_area(light: Light, scale: list[float]) -> float:
     return math.pi * light.radius**2 * 4.0 if light.radius > 0 else 1.0
 
 
-def _light_nodes(data: bpy.types.Light, notes: list[str], images: ImageTable) -> np.ndarray:
+def _light_nodes(name: str, graph: ShaderGraph, notes: list[str], images: ImageTable) -> np.ndarray:
     """Colour × strength (3,) of a light's nodes, textures by their mean; a note where they are more than numbers."""
-    graph = read_light(data, images)
     kinds = {node.kind for node in graph.nodes}
     if kinds - _LIGHT_NUMBERS:
-        notes.append(f"light {data.name}: {', '.join(sorted(kinds - _LIGHT_NUMBERS))} count by their mean")
+        notes.append(f"light {name}: {', '.join(sorted(kinds - _LIGHT_NUMBERS))} count by their mean")
     return mean_emission(graph, images.images)
+
+
+def _light_falloff(graph: ShaderGraph) -> tuple[float, float]:
+    """(power of the distance, m² that smooth it) by which a light's nodes change its falloff; the first of several counts."""
+    for node in graph.nodes:
+        for link in node.inputs.values():
+            if isinstance(link, Link) and graph.nodes[link.node].kind == "LIGHT_FALLOFF":
+                smooth = graph.nodes[link.node].inputs.get("Smooth", 0.0)
+                power = {"Linear": 1.0, "Constant": 2.0}.get(link.output, 0.0)
+                return power, max(smooth, 0.0) if isinstance(smooth, float) else 0.0
+    return 0.0, 0.0
 
 
 def _read_camera(

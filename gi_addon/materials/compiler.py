@@ -58,6 +58,7 @@ class CompiledGraph:
     emissive: bool = False
     transparent: bool = False
     transmissive: bool = False
+    tinted: bool = False  # what goes straight through, or is refracted, may be coloured
     subsurface: bool = False
     diffuse: bool = False
     glossy: bool = False

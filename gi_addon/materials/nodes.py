@@ -113,6 +113,7 @@ def principled(c: Compiler, n: Node) -> dict[str, Value]:
     transmission = c.input(n, "Transmission Weight", FLOAT, 0.0)
     if not transmission.is_zero:
         r.transmissive = True
+        r.tinted |= _coloured(base)
         c.statement(f"principled_transmission({out}, {base.text}, {metallic.text}, {roughness.text}, {ior.text}, "
                     f"{tint.text}, {transmission.text}, {normal}, {multi}, point);")  # fmt: skip
     subsurface = c.input(n, "Subsurface Weight", FLOAT, 0.0)
@@ -199,6 +200,7 @@ def glass(c: Compiler, n: Node) -> dict[str, Value]:
     """Reflection and refraction by Fresnel (Glass) or refraction alone."""
     c.result.transmissive = True
     color = c.input(n, "Color", COLOR, (1.0, 1.0, 1.0))
+    c.result.tinted |= _coloured(color)
     roughness = c.input(n, "Roughness", FLOAT, 0.0)
     ior = c.input(n, "IOR", FLOAT, 1.5)
     normal = _normal(c, n)
@@ -236,11 +238,17 @@ def _emission(c: Compiler, color: Value, strength: Value) -> Value:
     return c.variable(CLOSURE, f"closure_emission({color.text} * {strength.text})", constant)
 
 
+def _coloured(color: Value) -> bool:
+    """Whether a colour is, or may be, other than gray."""
+    return color.constant is None or len(set(color.constant)) > 1
+
+
 @node("BSDF_TRANSPARENT")
 def transparent(c: Compiler, n: Node) -> dict[str, Value]:
     """Light goes straight on, tinted."""
     c.result.transparent = True
     color = c.input(n, "Color", COLOR, (1.0, 1.0, 1.0))
+    c.result.tinted |= _coloured(color)
     return {"BSDF": c.variable(CLOSURE, f"closure_transparent({color.text})")}
 
 
@@ -355,6 +363,8 @@ def uv_map(c: Compiler, n: Node) -> dict[str, Value]:
 def attribute(c: Compiler, n: Node) -> dict[str, Value]:
     """A mesh attribute by name. Those of objects, instancers and view layers are numbers, which ``value`` (4,) holds."""
     name = n.params.get("attribute_name", "")
+    if n.params.get("carried"):  # by the instance, in place of its colour
+        return _attribute("point.object_color")
     if n.params.get("attribute_type", "GEOMETRY") != "GEOMETRY":
         *rgb, alpha = n.params.get("value", (0.0, 0.0, 0.0, 0.0))
         color = c.constant(tuple(rgb), COLOR)
@@ -451,8 +461,8 @@ def _coordinate(c: Compiler, n: Node, default: str) -> str:
 def image_texture(c: Compiler, n: Node) -> dict[str, Value]:
     """An image looked up by UV (or whatever is linked): flat, box, sphere or tube projection."""
     index = n.params.get("image")
-    if index is None:
-        return {"Color": c.constant((0.0, 0.0, 0.0), COLOR), "Alpha": c.constant(0.0, FLOAT)}
+    if index is None:  # as Cycles shows what it does not find
+        return {"Color": c.constant((1.0, 0.0, 1.0), COLOR), "Alpha": c.constant(1.0, FLOAT)}
     co = _coordinate(c, n, f"vec3({c.attribute('uv:')}.xy, 0.0)")
     sampler = c.image(index, n.params.get("interpolation", "Linear"), n.params.get("extension", "REPEAT"))
     projection = n.params.get("projection", "FLAT")

@@ -16,7 +16,7 @@ class DirectLighting(ScreenPass):
     title = "Direct Lighting Computation"
     figure = "Direct Lighting Computation"
     reads = (
-        "lights", Optional("lights.views"), Optional("shadow.depth"), Optional("rsm.depth"),
+        "lights", Optional("lights.views"), Optional("shadow.depth"), Optional("shadow.tint"), Optional("rsm.depth"),
         Optional("shadow.cones"), "gbuffer.depth", "gbuffer.normal", Optional("gbuffer.set"),
         Optional("gbuffer.specular", ("direct.glossy",)), Optional("gbuffer.lobe", ("direct.glossy",)),
         Optional("brdf.energy", ("direct.glossy",)), Optional("brdf.average", ("direct.glossy",)),
@@ -60,7 +60,8 @@ class TranslucentLighting(ScreenPass):
     title = "Translucent Direct Lighting"
     figure = "Direct Lighting Computation"
     reads = (
-        "lights", Optional("lights.views"), Optional("shadow.depth"), Optional("rsm.depth"), "translucent.depth",
+        "lights", Optional("lights.views"), Optional("shadow.depth"), Optional("shadow.tint"), Optional("rsm.depth"),
+        "translucent.depth",
         "translucent.normal", "translucent.color", "translucent.medium", Optional("translucent.set"),
     )  # fmt: skip
     writes = (

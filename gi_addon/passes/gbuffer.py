@@ -15,9 +15,22 @@ from .screen import ScreenPass, _screen, no_translucency
 BACKGROUND_DEPTH = 0.0  # no surface: view depths are positive
 
 
+# Blocks share where their cones end, the better the nearer they are to one another: fewer rows of blocks than this up the picture
+# are more error for no less time (docs/techniques/vct.md), since all the more pixels lie beside edges and gather for themselves.
+_ROWS_OF_BLOCKS = 72
+
+
+def gather_scale(facts: Facts) -> int:
+    """Pixels per side of one low-resolution gather."""
+    scale = facts.settings.gather_scale
+    if facts.settings.technique != "VCT":
+        return scale
+    return max(1, min(scale, facts.resolution[1] // _ROWS_OF_BLOCKS))
+
+
 def gather_size(facts: Facts) -> tuple[int, int]:
     """Texels of the low-resolution gather: the blocks that cover the picture wherever their grid starts."""
-    scale = facts.settings.gather_scale
+    scale = gather_scale(facts)
     return tuple(-(-(n + scale - 1) // scale) for n in facts.resolution)
 
 
@@ -138,6 +151,25 @@ class TranslucentTint(Pass):
         frame.gl.ctx.blend_func = moderngl.DEFAULT_BLENDING
 
 
+class CameraTint(Pass):
+    """The tint of all coloured transparent surfaces down to the opaque one."""
+
+    title = "Camera Tint"
+    reads = ("gbuffer.depth",)
+    writes = (
+        Texture("gbuffer.tint", "gbuf_tint", "share of what is behind that coloured transparent surfaces leave, by channel",
+                "rgba16f", _screen),
+    )  # fmt: skip
+
+    def absent(self, facts: Facts) -> str | None:
+        return None if facts.tinted else "nothing see-through has a colour"
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        frame.gl.ctx.blend_func = moderngl.ZERO, moderngl.SRC_COLOR
+        draw_for_camera(frame, planned, "passes/camera_tint_frag.glsl", "tinted", clear=1.0, mode=moderngl.BLEND)
+        frame.gl.ctx.blend_func = moderngl.DEFAULT_BLENDING
+
+
 def _nothing_refracts(facts: Facts) -> str | None:
     return no_translucency(facts) or (None if facts.transmissive else "no visible material refracts")
 
@@ -209,4 +241,4 @@ class GBufferMips(ScreenPass):
     fragment = "passes/gbuffer_mips_frag.glsl"
 
     def defines(self, facts: Facts) -> dict[str, int]:
-        return {"GATHER_SCALE": facts.settings.gather_scale}
+        return {"GATHER_SCALE": gather_scale(facts)}

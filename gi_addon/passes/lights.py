@@ -76,6 +76,71 @@ class ShadowMaps(Pass):
         return draw_light_maps(frame, planned, SHADOW, "passes/shadow_map_frag.glsl", full=False)
 
 
+class ShadowTint(Pass):
+    """The colour of what coloured see-through surfaces let through to each map's first solid one."""
+
+    title = "Shadow Tint"
+    reads = ("shadow.depth",)
+    writes = (
+        Texture("shadow.tint", "shadow_tint", "share of the light that they leave, by channel, over that of the brightest; "
+                "alpha: depth of the nearest of them", "rgba16f", lambda f: f.rig.shadow.size),
+    )  # fmt: skip
+    uniforms = _UNIFORMS
+    depends = ShadowMaps.depends
+    settings = ShadowMaps.settings
+    repeats = True
+
+    def rate(self, facts: Facts) -> str:
+        return ShadowMaps().rate(facts)
+
+    def absent(self, facts: Facts) -> str | None:
+        return ShadowMaps().absent(facts) or (None if facts.tinted else "nothing see-through has a colour")
+
+    def run(self, frame: Frame, planned: Planned) -> None:
+        rig = planned.facts.rig
+        fbo = frame.targets(planned)
+        fbo.use()
+        fbo.scissor = None
+        fbo.viewport = (0, 0, *fbo.size)
+        fbo.clear(1.0, 1.0, 1.0, 65504.0)
+        ctx = frame.gl.ctx
+        ctx.enable_only(moderngl.BLEND)
+        # Colours are multiplied, of depths the least is kept.
+        ctx.blend_func = moderngl.ZERO, moderngl.SRC_COLOR, moderngl.ONE, moderngl.ONE
+        ctx.blend_equation = moderngl.FUNC_ADD, moderngl.MIN
+        frame.bind(planned)
+        sample = frame.light_sample(bounce=False)
+        for view, clip in zip(sample.views, sample.clip_from_world, strict=True):
+            if rig.casts_shadow(int(view["light"])):
+                fbo.viewport = tuple(int(v) for v in view["rect"])
+                _draw_tints(frame, planned, SHADOW, view, np.ascontiguousarray(clip.T, "f4"))
+        ctx.blend_equation = moderngl.FUNC_ADD
+        ctx.blend_func = moderngl.DEFAULT_BLENDING
+
+
+def _draw_tints(frame: Frame, planned: Planned, visibility: int, view, clip_from_world: np.ndarray) -> None:
+    """Draw what tints the light of ``view`` into its tile of the bound targets."""
+    options = {
+        "full": True, "only": "tinted", "units": len(planned.texture_reads()), "defines": {
+            "SURFACE_TABLES": 0, "SURFACE_SEE_THROUGH_GLASS": 2, "SURFACE_SEEN_BY_CAMERA": 0, "SURFACE_SEEN_BY_SHADOW": 1,
+            "HAS_SHADOW_DEPTH": int(planned.has("shadow.depth")), "HAS_SHADOW_TINT": int(planned.has("shadow.tint")),
+        },
+    }  # fmt: skip
+    stages = {"vertex": _VERTEX, "fragment": "passes/light_tint_frag.glsl"}
+    for program in frame.gpu.programs(planned, stages, visibility, **options):
+        _set_view(frame, program, view)
+    frame.gpu.draw(planned, stages, visibility, clip_from_world, **options)
+
+
+def _set_view(frame: Frame, program, view) -> None:
+    frame.set(
+        program,
+        light_origin_ws=tuple(view["origin_ws"]),
+        light_axis_ws=tuple(view["axis_z"]),
+        light_perspective=float(view["perspective"]),
+    )
+
+
 class RSMGeneration(Pass):
     """What each light sees and how much of its light it reflects."""
 
@@ -163,7 +228,7 @@ def _draw_tiles(frame: Frame, planned: Planned, visibility: int, fragment: str, 
     frame.bind(planned)
     options = {
         "full": full, "units": len(planned.texture_reads()), "defines": {
-            "SURFACE_TABLES": 2 if planned.has("brdf.average") else 0, "SURFACE_SEE_THROUGH_GLASS": 1,
+            "SURFACE_TABLES": 2 if planned.has("brdf.average") else 0, "SURFACE_SEE_THROUGH_GLASS": 1 + int(planned.facts.tinted),
             "SURFACE_SEEN_BY_CAMERA": 0, "SURFACE_SEEN_BY_SHADOW": int(not full),
         },
     }  # fmt: skip
@@ -175,16 +240,24 @@ def _draw_tiles(frame: Frame, planned: Planned, visibility: int, fragment: str, 
             fbo.clear(nothing, nothing, nothing, nothing, depth=1.0, viewport=rect)
         fbo.viewport = rect
         for program in programs:
-            frame.set(
-                program,
-                light_origin_ws=tuple(view["origin_ws"]),
-                light_axis_ws=tuple(view["axis_z"]),
-                light_perspective=float(view["perspective"]),
-            )
+            _set_view(frame, program, view)
         for reaches, among in linked:
             for program in programs if full else ():
                 frame.set(program, light_reaches=reaches)
             frame.gpu.draw(planned, stages, visibility, clip_from_world, beyond=beyond, among=among, **options)
+    if planned.has("rsm.albedo") and planned.facts.tinted:
+        # What reflects here was lit through them.
+        albedo = [w.name for w in planned.texture_writes() if w.format != "depth24"].index("rsm.albedo")
+        fbo.color_mask = tuple((k == albedo,) * 4 for k in range(len(fbo.color_attachments)))
+        fbo.depth_mask = False
+        ctx.enable_only(moderngl.DEPTH_TEST | moderngl.BLEND)
+        ctx.blend_func = moderngl.ZERO, moderngl.SRC_COLOR
+        for view, clip_from_world, _, _ in tiles:
+            fbo.viewport = tuple(int(v) for v in view["rect"])
+            _draw_tints(frame, planned, visibility, view, clip_from_world)
+        ctx.blend_func = moderngl.DEFAULT_BLENDING
+        fbo.depth_mask = True
+        fbo.color_mask = ((True,) * 4,) * len(fbo.color_attachments)
 
 
 def _linked(rig: LightRig, index: int, bits: tuple[int, ...], full: bool) -> list[tuple[float, tuple[int, ...] | None]]:

@@ -34,7 +34,7 @@ class Resolve(Pass):
 
     def run(self, frame: Frame, planned: Planned) -> None:
         units = len(planned.texture_reads())
-        program = frame.program(planned, virtual={"generated/world.glsl": world_source(frame.gpu.world, units)})
+        program = frame.program(planned, virtual={"generated/world.glsl": world_source(frame.gpu.world, units, camera=True)})
         frame.bind(planned)
         frame.gpu.bind_world_params()
         frame.gpu.bind_images(frame.gpu.world, units)

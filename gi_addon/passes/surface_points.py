@@ -16,7 +16,8 @@ from ..sequence import sobol_2d
 SURFACE_SAMPLE = struct(
     ("position_ws", "f4", 3), ("area", "f4"),  # m², that it stands for in a sub-frame
     ("normal_ws", "f4", 3), ("_pad", "f4"),
-    ("albedo", "f4", 3), ("_pad1", "f4"),
+    ("albedo", "f4", 3), ("_pad1", "f4"),  # of the front, where the normal points
+    ("albedo_back", "f4", 3), ("_pad2", "f4"),
 )  # fmt: skip
 # Sub-frames with points of their own; later ones start over.
 SETS = 256
@@ -62,9 +63,10 @@ def surface_points(scene: Scene, count: int, per_set: int) -> np.ndarray:
     # Lamps are left out: what they reflect is nothing beside what they shine, and between a lamp and the ceiling it hangs
     # from, closer than a cell, light would be handed to and fro and leak.
     albedos = [
-        np.zeros(3) if (mean_emission(m.graph, scene.images) > 0.0).any() else mean_albedo(m.graph, scene.images)
+        np.zeros((2, 3)) if (mean_emission(m.graph, scene.images) > 0.0).any()
+        else np.stack([mean_albedo(m.graph, scene.images, back=back) for back in (False, True)])
         for m in scene.materials
-    ]
+    ]  # fmt: skip
     corners, colors = [], []
     instances = scene.instances
     for i in range(len(instances)):
@@ -76,7 +78,9 @@ def surface_points(scene: Scene, count: int, per_set: int) -> np.ndarray:
             if size and (color > 0.0).any():
                 triangles = mesh.positions[mesh.triangles[first : first + size]].astype("f8")
                 corners.append(triangles @ instances.matrix[i, :3, :3].T + instances.matrix[i, :3, 3])
-                colors.append(np.broadcast_to(color, (size, 3)))
+                # A mirrored triangle winds the other way, its front stays.
+                mirrored = np.linalg.det(instances.matrix[i, :3, :3]) < 0.0
+                colors.append(np.broadcast_to(color[::-1] if mirrored else color, (size, 2, 3)))
     if not corners:
         return out
     corners, colors = np.concatenate(corners), np.concatenate(colors)
@@ -95,6 +99,6 @@ def surface_points(scene: Scene, count: int, per_set: int) -> np.ndarray:
     b1, b2 = first * (1.0 - x[:, 1]), first * x[:, 1]
     out["position_ws"] = a[index] + u[index] * b1[:, None] + v[index] * b2[:, None]
     out["normal_ws"] = normal[index] / np.maximum(2.0 * area[index], 1e-30)[:, None]
-    out["albedo"] = colors[index]
+    out["albedo"], out["albedo_back"] = colors[index, 0], colors[index, 1]
     out["area"] = total / per_set
     return out

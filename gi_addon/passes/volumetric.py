@@ -56,6 +56,18 @@ def set_medium(frame: Frame, program, facts: Facts) -> None:
         )
 
 
+def no_air(facts: Facts) -> str | None:
+    """Why no light is scattered or lost in the air, or None."""
+    if not facts.settings.use_volumetric:
+        return "volumetric light is switched off"
+    return None if air(facts) else "neither the world nor an object is a volume, and volume.density is 0"
+
+
+def step_turn(frame: Frame) -> float:
+    """Where in its stratum each point on a view ray lies in this sub-frame, [0, 1)."""
+    return float(sobol_2d(frame.subframe, 8)[0])
+
+
 class Volumetric(ScreenPass):
     """In-scattered light and transmittance of every pixel's ray."""
 
@@ -82,9 +94,7 @@ class Volumetric(ScreenPass):
         return {**medium_defines(facts), "RADIAL_BLUR": 0, "VOXEL_VISIBILITY": 0}
 
     def absent(self, facts: Facts) -> str | None:
-        if not facts.settings.use_volumetric:
-            return "volumetric light is switched off"
-        return None if air(facts) else "neither the world nor an object is a volume, and volume.density is 0"
+        return no_air(facts)
 
     def prepare(self, frame: Frame, planned: Planned, program) -> None:
         facts = planned.facts
@@ -93,5 +103,5 @@ class Volumetric(ScreenPass):
             program,
             light_count=len(facts.rig.sources),
             step_count=facts.settings.volume.samples,
-            step_turn=float(sobol_2d(frame.subframe, 8)[0]),
+            step_turn=step_turn(frame),
         )

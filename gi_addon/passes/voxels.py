@@ -26,6 +26,8 @@ from ..scene import DIFFUSE
 
 # Sums are fixed point: this many units are one cell face of area. 32 bits then hold 4096 layers of surface in one cell.
 UNITS = 1 << 20
+# An emitter of the scene's brightest mean radiance fills 2¹⁶ units, so that textures may outshine their mean 4096 times over.
+EMISSION_UNITS = 1 << 16
 # Words per cell: area, area × opacity, albedo; of each of six sheets its area, slopes and height; squares covered; how much of
 # what is reflected is diffuse; how far each sheet reaches; emission; area of lamps by side.
 _WORDS, _EMISSION_WORDS, _LAMP_WORDS = 57, 3, 6
@@ -116,7 +118,7 @@ class Voxelisation(Pass):
                 mips=lambda f: voxel_grid(f).levels, scratch=True),
         Texture("voxels.albedo", "voxel_albedo", "mean share of light that the surfaces reflect; how much of it is diffuse",
                 "rgba8", _size),
-        Texture("voxels.emission", "voxel_emission", "mean emitted radiance, W/(m²·sr)", "rgba16f", _size,
+        Texture("voxels.emission", "voxel_emission", "mean emitted radiance over the brightest emitter's", "rgba16f", _size,
                 when=lambda f: None if f.glowing_voxels else "no voxel shines: nothing emits, or lights sampled on it do"),
         Texture("voxels.lamps", "voxel_lamps", "share of the cell's face along x, y, z that lamps cover", "rgba8", _size,
                 when=lambda f: None if _lamps(f) else "no light is drawn from emissive surfaces"),
@@ -147,7 +149,7 @@ class Voxelisation(Pass):
 
     def defines(self, facts: Facts) -> dict[str, int]:
         return {"VOXEL_UNITS": UNITS, "VOXEL_WORDS": _words(facts), "VOXEL_EMISSION": int(facts.glowing_voxels),
-                "VOXEL_LAMPS": int(_lamps(facts))}
+                "VOXEL_LAMPS": int(_lamps(facts)), "EMISSION_UNITS": EMISSION_UNITS}
 
     def run(self, frame: Frame, planned: Planned) -> None:
         facts = planned.facts
@@ -165,9 +167,8 @@ class Voxelisation(Pass):
                 "SURFACE_SEEN_BY_CAMERA": 0, "SURFACE_SEEN_BY_SHADOW": 0,
             },
         }  # fmt: skip
-        # An emitter of mean radiance fills 2¹⁶ units, so that textures may outshine their mean 4096 times over.
         brightest = float(facts.emitters.radiance.max()) if len(facts.emitters) else 1.0
-        values = {**grid.uniforms(), "emission_unit": max(brightest, 1e-30) / 65536.0}
+        values = {**grid.uniforms(), "emission_unit": max(brightest, 1e-30) / EMISSION_UNITS}
         layers = _slab(facts)
         for first in range(0, grid.size[2], layers):
             count = min(layers, grid.size[2] - first)

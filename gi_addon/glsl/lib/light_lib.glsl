@@ -31,6 +31,12 @@ vec3 light_intensity(Light light, vec3 direction_ws)
     return light.emission * (cos_l * profile);
 }
 
+// What a falloff of other than the distance's square makes of the irradiance at distance² `d2` (m²).
+float light_falloff(Light light, float d2)
+{
+    return pow(max(d2, 1e-30), 0.5 * light.falloff) * d2 / max(d2 + light.falloff_smooth, 1e-30);
+}
+
 bool light_is_directional(Light light) { return light.kind == LIGHT_SUN || light.kind == LIGHT_WORLD; }
 
 // How far light has come to a point: 1e30 m from infinitely far away.
@@ -56,6 +62,7 @@ vec3 light_arriving(Light light, vec3 position_ws, out vec3 l, out float angle)
         return vec3(0.0);
     }
     l = to_light * inversesqrt(distance2);
+    float falloff = light_falloff(light, distance2);
     float facing = light.kind == LIGHT_AREA || light.kind == LIGHT_MESH ? abs(dot(l, light.axis_ws)) : 1.0;
     angle = light.patch_radius * sqrt(facing / distance2);
     if (light.kind == LIGHT_POINT || light.kind == LIGHT_SPOT) {
@@ -67,7 +74,7 @@ vec3 light_arriving(Light light, vec3 position_ws, out vec3 l, out float angle)
         // The patch is a disc of its own area: π r² L / (d² + r²) facing it, bounded where the point would not be.
         distance2 += sqr(light.patch_radius);
     }
-    return light_intensity(light, -l) / max(distance2, 1e-37);
+    return light_intensity(light, -l) * (falloff / max(distance2, 1e-37));
 }
 
 // --- views -----------------------------------------------------------------------------------------------------------
@@ -112,6 +119,7 @@ vec3 light_view_flux(LightView v, Light light, vec2 xy, vec2 texel, float depth,
     float solid_angle = texel_solid_angle(plane, texel * scale);
     vec3 d = v.axis_x * xy.x + v.axis_y * xy.y + v.axis_z;
     float length2 = dot(d, d);
-    beam_area = solid_angle * depth * depth * length2;
-    return light_intensity(light, d * inversesqrt(length2)) * solid_angle;
+    float distance2 = depth * depth * length2;
+    beam_area = solid_angle * distance2;
+    return light_intensity(light, d * inversesqrt(length2)) * (solid_angle * light_falloff(light, distance2));
 }

@@ -8,6 +8,7 @@
 #include "lib/bsdf_lib.glsl"
 #include "lib/sequence_lib.glsl"
 #include "lib/shadow_lib.glsl"
+#include "lib/tint_lib.glsl"
 #if HAS_MEDIUM
 #include "lib/medium_lib.glsl"
 #endif
@@ -79,8 +80,9 @@ void main()
                 visible *= screen_visibility(light, receiver_ws, l, fract(turn * 0.159154943 + 0.618034 * float(i))); // 1/2π
             }
 #endif
+            open_light += arriving * cos_l * light.diffuse;
+            arriving *= light_tint(light, position_ws);
             vec3 irradiance = arriving * cos_l;
-            open_light += irradiance * light.diffuse;
             lit_light += irradiance * visible * light.diffuse;
 #if HAS_DIRECT_GLOSSY
             if (has_lobe && visible > 0.0) {

@@ -17,8 +17,11 @@ void main()
     vec3 facing = abs(cross(dx, dy));
     float along = facing[dominant];
 #if SURFACE_FULL
-    // A surface that lets half of the light through or more does not count.
-    if (surface_opacity(surface_closure(surface_point(vec3(0.0, 0.0, 1.0)))) < 0.5) {
+    // A surface that lets half of the light through or more does not count. It is seen from its front: a wall whose back is
+    // cut away is a wall.
+    vec3 ng = safe_normalize(cross(dFdx(vary_position_ws), dFdy(vary_position_ws)));
+    vec3 front = dot(vary_normal_ws, ng) < 0.0 ? -ng : ng;
+    if (surface_opacity(surface_closure(surface_point(front))) < 0.5) {
         discard;
     }
 #endif

@@ -36,6 +36,7 @@ void main()
     catcher = mark == -2.0;
 #endif
     bool surface = depth > 0.0 && !catcher;
+    bool glass = false;
     // A shadow catcher is not there but for its shadow: over the world, or as the picture's alpha.
     vec3 lit_share = vec3(1.0);
 #if HAS_DIRECT_SHADOW
@@ -53,6 +54,7 @@ void main()
     vec3 emission = vec3(0.0);
     vec3 environment = vec3(0.0);
     vec3 volume = vec3(0.0);
+    vec3 volume_bounced = vec3(0.0);
 
     if (surface) {
 #if HAS_GBUF_DIFFUSE
@@ -86,7 +88,7 @@ void main()
 #if HAS_GBUF_EMISSION
         emission = texelFetch(gbuf_emission, pixel, 0).rgb;
 #endif
-    } else if (view.film_transparent < 0.5 && WORLD_VISIBLE != 0) {
+    } else if (WORLD_VISIBLE != 0) {
         environment = world_radiance(normalize(ray_direction_ws(uv))) * lit_share;
     }
 #if HAS_GBUF_TRANSMISSION
@@ -94,7 +96,8 @@ void main()
     // what lies straight behind. Direct is what shines by itself (Cycles counts one refraction, then the light).
     vec4 tint = texelFetch(gbuf_transmission, pixel, 0);
     through_color = tint.rgb;
-    if (tint.a < 0.5) {
+    glass = tint.a < 0.5;
+    if (glass) {
         through_direct = (emission + environment) * through_color;
         through_indirect = (diffuse_direct + diffuse_indirect + glossy_direct + glossy_indirect) * through_color;
 #if HAS_TRANSMISSION_INDIRECT
@@ -122,7 +125,7 @@ void main()
         through_color = vec3(0.0);
     }
 #endif
-    // What is behind a medium arrives dimmed, in every pass, the colours too, as in Cycles.
+    // What is behind a medium or a coloured film arrives dimmed, in every pass, the colours too, as in Cycles.
     vec3 passes = vec3(1.0);
 #if HAS_VOLUME_LIGHT
     volume = texelFetch(volume_light, pixel, 0).rgb;
@@ -131,6 +134,12 @@ void main()
     passes = texelFetch(volume_transmittance, pixel, 0).rgb;
 #elif HAS_VOLUME_LIGHT
     passes = vec3(texelFetch(volume_light, pixel, 0).a);
+#endif
+#if HAS_GBUF_TINT
+    passes *= texelFetch(gbuf_tint, pixel, 0).rgb;
+#endif
+#if HAS_VOLUME_INDIRECT
+    volume_bounced = texelFetch(volume_indirect, pixel, 0).rgb;
 #endif
     diffuse_color *= passes;
     through_color *= passes;
@@ -144,9 +153,11 @@ void main()
     environment *= passes;
 
 #if LAYER_COMBINED >= 0
-    float alpha = !held && (surface || view.film_transparent < 0.5) ? 1.0 : catcher ? saturate(1.0 - vector_mean(lit_share)) : 0.0;
+    // As in Cycles, a transparent film leaves the world out of the picture but not out of its pass.
+    vec3 behind = view.film_transparent < 0.5 ? environment : vec3(0.0);
+    float alpha = !held && (surface || glass || view.film_transparent < 0.5) ? 1.0 : catcher ? saturate(1.0 - vector_mean(lit_share)) : 0.0;
     add(LAYER_COMBINED, pixel, vec4(diffuse_direct + diffuse_indirect + glossy_direct + glossy_indirect +
-                                        through_direct + through_indirect + volume + emission + environment,
+                                        through_direct + through_indirect + volume + volume_bounced + emission + behind,
                                     alpha));
 #endif
 #if LAYER_DEPTH >= 0
@@ -202,6 +213,9 @@ void main()
 #endif
 #if LAYER_VOLUME_DIRECT >= 0
     add(LAYER_VOLUME_DIRECT, pixel, vec4(volume, 1.0));
+#endif
+#if LAYER_VOLUME_INDIRECT >= 0
+    add(LAYER_VOLUME_INDIRECT, pixel, vec4(volume_bounced, 1.0));
 #endif
 #if LAYER_EMISSION >= 0
     add(LAYER_EMISSION, pixel, vec4(emission, 1.0));

@@ -20,7 +20,7 @@ void main()
         discard;
     }
     // The chosen share is seen whole: its tint is that of what passes, not of how much does.
-    float share = max(1.0 - opacity - vector_mean(c.transparent), 1e-4);
+    float share = max(1.0 - opacity - max3(c.transparent), 1e-4);
     vec3 color = (c.transmission + c.translucent) / share;
 #if TINT_ONLY
     gbuf_transmission = vec4(color, 0.0); // alpha says that there is one: clear glass has tint 1

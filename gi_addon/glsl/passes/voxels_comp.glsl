@@ -40,7 +40,7 @@ void main()
 #endif
 #if HAS_VOXEL_EMISSION
     vec3 emission = vec3(voxel_sums[first + 57u], voxel_sums[first + 58u], voxel_sums[first + 59u]);
-    imageStore(voxel_emission, cell, vec4(emission * (emission_unit * float(VOXEL_UNITS) * color), 0.0));
+    imageStore(voxel_emission, cell, vec4(emission * (float(VOXEL_UNITS) * color / float(EMISSION_UNITS)), 0.0));
 #endif
 #if HAS_VOXEL_LAMPS
     vec3 lamps = vec3(0.0);

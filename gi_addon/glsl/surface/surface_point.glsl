@@ -63,16 +63,25 @@ SurfacePoint surface_point(vec3 view_ws)
 float surface_bulge() { return max(0.5 * (vary_height - dot(vary_relative_ws, vary_normal_ws)), 0.0); }
 
 // How much of the surface stops a ray: what is neither cut out nor see-through. Refracting surfaces count as
-// see-through to the maps that only ask what blocks light (SURFACE_SEE_THROUGH_GLASS).
+// see-through to the maps that only ask what blocks light (SURFACE_SEE_THROUGH_GLASS), by their brightest channel where the
+// map also knows the tint of what passes (2).
 float surface_opacity(Closure c)
 {
-    float through = vector_mean(c.transparent);
 #if SURFACE_SEEN_BY_CAMERA
+    float through = max3(c.transparent);
     // What refracts or scatters on is shaded with its tint, and by the brightest channel no tint is over 1: behind many
     // panes or leaves the product of tints would be rare and huge. To light, what scatters on is as solid as paper.
-    through += max3(c.transmission + c.translucent);
+    // Rough glass may pass all and reflect besides: then what it reflects has its part of the sub-frames by its weight, and the
+    // tint makes up for it.
+    float passing = max3(c.transmission + c.translucent);
+    float reflected = max3(c.f0 + c.diffuse);
+    through += min(passing, (1.0 - through) * passing / max(passing + reflected, 1e-6));
+#elif SURFACE_SEE_THROUGH_GLASS > 1
+    float through = max3(c.transparent + c.transmission);
 #elif SURFACE_SEE_THROUGH_GLASS
-    through += vector_mean(c.transmission);
+    float through = vector_mean(c.transparent) + vector_mean(c.transmission);
+#else
+    float through = vector_mean(c.transparent);
 #endif
     return saturate(1.0 - through);
 }

@@ -15,11 +15,10 @@ void main()
     int base = (cell_index(ivec3(at.xy, at.z - coefficient * grid_size.z), grid_size) * SH_COUNT + coefficient) * 3;
     vec3 reflected = vec3(lpv_reflected[base], lpv_reflected[base + 1], lpv_reflected[base + 2]);
     vec3 sum = source_scale * texelFetch(lpv_source, volume_texel(at, 0), 0).rgb + reflected / (fixed_scale * grid_cell * grid_cell);
-#if HAS_MEDIUM
-    // Q/h² = h³ σs ∫ p L dω / h². Henyey and Greenstein's phase function scales harmonics of order l by g^l.
-    float order = coefficient == 0 ? 0.0 : coefficient < 4 ? 1.0 : 2.0;
-    float phase = order == 0.0 ? 1.0 : pow(abs(medium_anisotropy), order) * (order == 1.0 ? sign(medium_anisotropy) : 1.0);
-    sum += medium_scattering * (grid_cell * phase) * imageLoad(lpv_volume, volume_texel(at, 0)).rgb;
+#if HAS_LPV_AIR
+    // Q/h² = h³ σs ∫ p L dω / h².
+    vec4 air = texelFetch(lpv_air, volume_texel(ivec3(at.xy, at.z - coefficient * grid_size.z), 1), 0);
+    sum += air.rgb * (grid_cell * phase_share(coefficient, air.a)) * imageLoad(lpv_volume, volume_texel(at, 0)).rgb;
 #endif
     imageStore(lpv_bounced, volume_texel(at, 0), vec4(sum, 0.0));
 }

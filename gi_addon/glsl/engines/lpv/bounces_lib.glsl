@@ -38,8 +38,7 @@ bool wall_near(vec3 at, vec3 direction, out vec3 place, out vec3 n, out vec3 alb
             n = dot(n, direction) > 0.0 ? -n : n;
             place = upper + 0.5;
             place[axis] += wall.y - 1.0;
-            albedo = uintBitsToFloat(uvec3(lpv_albedo[face * 3], lpv_albedo[face * 3 + 1], lpv_albedo[face * 3 + 2])) *
-                     dot(abs(n), vec3(1.0)); // it is stored over |n|₁
+            albedo = uintBitsToFloat(uvec3(lpv_albedo[face * 3], lpv_albedo[face * 3 + 1], lpv_albedo[face * 3 + 2]));
         }
     }
     return found;

@@ -1,4 +1,4 @@
-// Harmonics of the radiance in each cell, ∫ L Y dω, by the ordinates' quadrature.
+// Harmonics of the radiance in each cell, ∫ L Y dω, by the ordinates' quadrature, and the flux that its walls absorb, over h².
 
 #include "engines/lpv/lpv_lib.glsl"
 
@@ -14,15 +14,25 @@ void main()
     for (int c = 0; c < SH_COUNT; ++c) {
         sum[c] = batch_first == 0 ? vec3(0.0) : imageLoad(lpv_volume, volume_texel(cell, c)).rgb;
     }
+#if HAS_LPV_ABSORBED
+    vec3 absorbed = batch_first == 0 ? vec3(0.0) : imageLoad(lpv_absorbed, volume_texel(cell, 0)).rgb;
+#endif
     for (int i = 0; i < batch_count; ++i) {
-        vec3 value = imageLoad(lpv_radiance, volume_texel(cell, i)).rgb;
+        vec4 carried = imageLoad(lpv_radiance, volume_texel(cell, i));
+        vec3 value = carried.rgb;
         vec4 ordinate = ordinates[batch_first + i];
         float y[SH_COUNT];
         sh_basis(ordinate.xyz, y);
         for (int c = 0; c < SH_COUNT; ++c) {
             sum[c] += value * (ordinate.w * y[c]);
         }
+#if HAS_LPV_ABSORBED
+        absorbed += value * (ordinate.w * max(carried.a - 1.0, 0.0));
+#endif
     }
+#if HAS_LPV_ABSORBED
+    imageStore(lpv_absorbed, volume_texel(cell, 0), vec4(absorbed, 0.0));
+#endif
     for (int c = 0; c < SH_COUNT; ++c) {
         imageStore(lpv_volume, volume_texel(cell, c), vec4(sum[c], 0.0));
     }

@@ -16,9 +16,8 @@ void main()
 {
     vec3 ng = safe_normalize(cross(dFdx(vary_position_ws), dFdy(vary_position_ws)));
 #if SURFACE_FULL
-    vec3 along = vec3(0.0);
-    along[axis] = 1.0;
-    Closure c = surface_closure(surface_point(along));
+    // Seen from its front: a wall whose back is cut away is a wall.
+    Closure c = surface_closure(surface_point(dot(vary_normal_ws, ng) < 0.0 ? -ng : ng));
     float opacity = surface_opacity(c);
     if (!surface_is_there(opacity, 2u)) {
         discard;
@@ -48,9 +47,9 @@ void main()
 #if SURFACE_TABLES > 0
     albedo += lobe_albedo_average(brdf_average, brdf_energy, closure_lobe(c));
 #endif
-    vec3 share = saturate(albedo / max(opacity, 1e-4)) / max(dot(abs(ng), vec3(1.0)), 1.0);
+    vec3 share = saturate(albedo / max(opacity, 1e-4));
     for (int k = 0; k < 3; ++k) {
-        atomicAdd(lpv_albedo[face_index(cell, axis) * 3 + k], uint(share[k] * 255.0 + 0.5));
+        atomicAdd(lpv_albedo[face_index(cell, axis) * 3 + k], uint(share[k] * LPV_ALBEDO_UNITS));
     }
 #endif
 }

@@ -49,6 +49,54 @@ VolumeSample volume_sample(vec3 at, vec3 surface, vec3 n)
     return s;
 }
 
+// Σ L_lm weights_lm at grid point `at` of the air, and how much of the eight cells around is not behind a wall.
+vec4 air_sample(vec3 at, float weights[SH_COUNT])
+{
+    vec4 sum = vec4(0.0);
+    vec3 base = floor(at - 0.5);
+    vec3 f = at - 0.5 - base;
+    for (int i = 0; i < 8; ++i) {
+        ivec3 corner = ivec3(i & 1, (i >> 1) & 1, i >> 2);
+        ivec3 cell = ivec3(base) + corner;
+        vec3 t = mix(1.0 - f, f, vec3(corner));
+        float weight = t.x * t.y * t.z;
+        if (!inside_grid(cell, grid_size) || weight <= 0.0) {
+            continue;
+        }
+#if HAS_LPV_WALLS
+        weight *= open_way(at, cell);
+#endif
+        if (weight > 0.0) {
+            vec3 value = vec3(0.0);
+            for (int c = 0; c < SH_COUNT; ++c) {
+                value += weights[c] * texelFetch(lpv_volume, volume_texel(cell, c), 0).rgb;
+            }
+            sum += weight * vec4(value, 1.0);
+        }
+    }
+    return sum;
+}
+
+// Σ L_lm weights_lm at a point of the air, in the finest grid around it (volume_light).
+vec3 volume_along(vec3 position_ws, float weights[SH_COUNT])
+{
+    vec3 sum = vec3(0.0);
+    float rest = 1.0;
+    for (int k = LPV_GRIDS - 1; k >= 0; --k) {
+        use_grid(k);
+        vec3 at = (position_ws - grid_origin) / grid_cell;
+        float share = k == 0 ? 1.0 : grid_share(at);
+        if (rest * share > 0.0) {
+            vec4 s = air_sample(at, weights);
+            if (s.a > 0.0) {
+                sum += rest * share * s.rgb / s.a;
+                rest *= 1.0 - share;
+            }
+        }
+    }
+    return max(sum, vec3(0.0)); // harmonics of order 2 go below 0 as in volume_irradiance
+}
+
 // Half a cell in front of a surface at grid point `surface` seen from `eye` (unit vector towards it); cells behind it count
 // nothing, so it need not be farther off for walls at an angle. What the eye sees is on the open side
 // of all walls, which a point on an edge would not tell: it is moved to the eye so far that walls, whose places are rounded to

@@ -27,6 +27,9 @@ void sh_basis(vec3 w, out float y[SH_COUNT])
 // √(π/3) = 1.0233 for order 1: π · 1 · .2821 = .8862 and π · 2/3 · .4886 = 1.0233.
 float sh_cosine_share(int c) { return c == 0 ? 1.0 : c < 4 ? 2.0 / 3.0 : 0.25; }
 
+// Henyey and Greenstein's phase function scales the harmonics of order l of what it scatters by g^l.
+float phase_share(int c, float g) { return c == 0 ? 1.0 : c < 4 ? g : g * g; }
+
 // How far a point must go along a unit normal to be in a cell whose centre is not behind the surface, in cells: the cell's
 // half width along the normal. Half a cell for a wall along the grid.
 float half_cell_shift(vec3 n) { return 0.5 * (abs(n.x) + abs(n.y) + abs(n.z)); }

@@ -16,7 +16,8 @@
 // radiance is its flux over the rest:
 //     L = F/K,  F = Σ_a |ω_a| (1 − κ_a) L_a + Q/h²,  K = the smaller of Σ_behind and Σ_ahead of |ω_a| (1 − κ_a [as above]).
 // What goes on is L, or less where the open faces would pass more than F; the rest of F is absorbed. An isotropic field in
-// front of a wall of any direction then stays one. Alpha holds the share of L that goes on.
+// front of a wall of any direction then stays one. Alpha holds the share of L that goes on; above 1 all does, and alpha − 1 is
+// what is absorbed per L, so that a bounce has the very light that came to an end (reflect_comp.glsl).
 //
 // Deviation from Kaplanyan and Dachsbacher: they send each cell's flux on as a cosine lobe about the face it passed, which
 // turns light by up to 90° per cell: measured in an empty room with one lit wall, the wall opposite gets 0.010 B from 8³ cells
@@ -65,9 +66,8 @@ void main()
     vec3 flux = imageLoad(lpv_radiance, volume_texel(cell, ordinate)).rgb;
 #endif
     float whole = share.x + share.y + share.z;
-    vec3 kept = vec3(1.0);
-#if HAS_MEDIUM
-    kept = exp(-medium_extinction * (grid_cell / whole)); // a straight way crosses |ω|₁/h faces per metre
+#if HAS_LPV_AIR
+    vec3 here = texelFetch(lpv_air, volume_texel(cell, 0), 0).rgb;
 #endif
     float behind = whole;
     float ahead = whole;
@@ -92,9 +92,13 @@ void main()
 #endif
             vec4 neighbour = imageLoad(lpv_radiance, volume_texel(from, ordinate));
 #if LPV_LIMITED
-            neighbour *= float(wave > 0); // before the first iteration a cell has only what it emits
+            neighbour.rgb *= float(wave > 0); // before the first iteration a cell has only what it emits
 #endif
-            flux += (share[axis] * (1.0 - coverage) * neighbour.a) * neighbour.rgb * kept;
+#if HAS_LPV_AIR
+            // A straight way crosses |ω|₁/h faces per metre, half of it on either side of each.
+            neighbour.rgb *= exp((here + texelFetch(lpv_air, volume_texel(from, 0), 0).rgb) * (-0.5 * grid_cell / whole));
+#endif
+            flux += (share[axis] * (1.0 - coverage) * min(neighbour.a, 1.0)) * neighbour.rgb;
         }
 #if HAS_LPV_WALLS
         if (local[axis] < grid_size[axis] - 1) {
@@ -111,7 +115,7 @@ void main()
     float section = min(behind, ahead);
     // A cell whose every face is a wall that the light leaves, or none of them one it could come from, has no cross-section.
     section = section > 1e-3 * whole ? section : whole;
-    float passed = open_ahead > section ? section / open_ahead : 1.0;
+    float passed = open_ahead > section ? section / open_ahead : 1.0 + section - open_ahead;
 #if LPV_LIMITED
     imageStore(lpv_carried, volume_texel(cell, ordinate), vec4(flux / section, passed));
 #else

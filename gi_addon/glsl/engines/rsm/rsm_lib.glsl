@@ -32,6 +32,18 @@ int rsm_view_of(Light light, vec3 position_ws)
     return best;
 }
 
+// Map coordinates of a texel's centre, and of the part of it that is the view's own; false where there is none. The margin around
+// the light's own span belongs to its other views: of a texel across the border only the part inside counts, so that all views'
+// texels sum to the light's flux.
+bool rsm_texel_span(LightView v, ivec2 pixel, out vec2 xy, out vec2 low, out vec2 high)
+{
+    vec2 texel = 2.0 * v.guard / v.rect.zw;
+    xy = (vec2(pixel) + 0.5 - v.rect.xy) * texel - v.guard;
+    low = clamp(xy - 0.5 * texel, vec2(-1.0), vec2(1.0));
+    high = clamp(xy + 0.5 * texel, vec2(-1.0), vec2(1.0));
+    return all(lessThan(low, high));
+}
+
 // What texel `pixel` of view `index` reflects. A surface of area A under the beam's cross-section B at angle θ has
 // A = B / cosθ; shading normals take irradiance by their own cosine, so Φ = albedo · E · cos θ_shading · A. A flat-shaded
 // surface gives Φ = albedo × the arriving flux.
@@ -45,13 +57,8 @@ RsmTexel rsm_texel(int index, ivec2 pixel)
         return t;
     }
     float depth = texelFetch(rsm_depth, pixel, 0).r;
-    vec2 texel = 2.0 * v.guard / v.rect.zw;
-    vec2 xy = (vec2(pixel) + 0.5 - v.rect.xy) * texel - v.guard;
-    // The margin around the light's own span belongs to its other views: of a texel across the border only the part
-    // inside counts, so that all views' texels sum to the light's flux.
-    vec2 low = clamp(xy - 0.5 * texel, vec2(-1.0), vec2(1.0));
-    vec2 high = clamp(xy + 0.5 * texel, vec2(-1.0), vec2(1.0));
-    if (any(lessThanEqual(high, low))) {
+    vec2 xy, low, high;
+    if (!rsm_texel_span(v, pixel, xy, low, high)) {
         return t;
     }
     float beam;

@@ -75,7 +75,7 @@ vec4 thing_ends(vec4 here, vec4 next) { return here.w > 0.0 && next.w < 0.0 ? ne
 vec4 last_thing_ends(vec4 here) { return here.w < 0.0 ? here : NOT_KNOWN; }
 #endif
 
-Gathered gather_screen(vec3 position_ws, vec3 n, vec3 ng, vec3 v, ivec2 place)
+Gathered gather_screen(vec3 position_ws, vec3 n, vec3 ng, vec3 v, ivec2 place, int slices)
 {
     Gathered g = Gathered(vec3(0.0), vec4(0.0));
     float reach = ssdo_radius > 0.0 ? ssdo_radius : 2.0 * view.scene_radius;
@@ -84,10 +84,10 @@ Gathered gather_screen(vec3 position_ws, vec3 n, vec3 ng, vec3 v, ivec2 place)
     uint run = 4u * view.subframe + uint((place.x & 1) + 2 * (place.y & 1));
     mat3 frame = frame_from_normal(v);
     vec4 c = view.clip_from_world * vec4(position_ws, 1.0);
-    for (int i = 0; i < ssdo_slices; ++i) {
-        vec2 u = r2_sequence(run * uint(ssdo_slices) + uint(i));
+    for (int i = 0; i < slices; ++i) {
+        vec2 u = r2_sequence(run * uint(slices) + uint(i));
         // Evenly about the eye's direction; each further run halves the gaps.
-        float phi = PI * (float(i) + unit_float(bitfieldReverse(run))) / float(ssdo_slices);
+        float phi = PI * (float(i) + unit_float(bitfieldReverse(run))) / float(slices);
         vec3 t = frame * vec3(cos(phi), sin(phi), 0.0);
         Slice slice = make_slice(n, v, t, u.y);
         uint mask = ~sectors_above(slice, ng, v, t);
@@ -160,7 +160,7 @@ Gathered gather_screen(vec3 position_ws, vec3 n, vec3 ng, vec3 v, ivec2 place)
         }
 #endif
     }
-    g.radiance /= float(ssdo_slices);
-    g.direction /= float(ssdo_slices);
+    g.radiance /= float(slices);
+    g.direction /= float(slices);
     return g;
 }

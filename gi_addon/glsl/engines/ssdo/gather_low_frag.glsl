@@ -12,7 +12,7 @@ void main()
     // Smoothing and interpolation reach two blocks far.
     if (r.exists && receives(r.pixel, 3 * GATHER_SCALE)) {
         vec2 uv = (vec2(r.pixel) + 0.5) * view.inverse_resolution;
-        Gathered g = gather_screen(r.position_ws, r.n, r.ng, view_direction_ws(uv), block);
+        Gathered g = gather_screen(r.position_ws, r.n, r.ng, view_direction_ws(uv), block, ssdo_slices);
         raw_indirect = vec4(g.radiance, 0.0);
         raw_direction = g.direction;
     }

@@ -99,7 +99,8 @@ Covered scan_next(sampler2D planes, inout Scan scan, Slice slice, int k, vec4 en
     Covered r = Covered(a, vec2(1.0, 0.0), 0.0, 0u, 0u);
     float until = 1.0;
     if (k < scan.steps) {
-        b.s = mix(scan.pixel, 1.0, spacing(float(k), scan.steps, scan.jitter));
+        // The last one is a pixel before the end, which may be where the scene ends: of that pixel's surface is the rest.
+        b.s = mix(scan.pixel, max(1.0 - scan.pixel, scan.pixel), spacing(float(k), scan.steps, scan.jitter));
         b.pixel = ivec2(scan.origin.xy + scan.way * b.s);
         if (b.pixel == a.pixel) {
             scan.last = b;
@@ -120,7 +121,9 @@ Covered scan_next(sampler2D planes, inout Scan scan, Slice slice, int k, vec4 en
         // b, continued to the middle of `a`, is on the other side of a.
         float gap_middle = a.plane.x - plane_at(b, vec2(a.pixel) + 0.5);
         bool passed = gap * gap_middle < 0.0 && gap * (gap_latest - gap) > 0.0;
-        bool meet = (at_edge || passed || gap * gap_latest < 0.0) && min(a.plane.x, b.plane.x) > 0.5 * NOTHING;
+        // Two samples of one plane meet anywhere, by rounding.
+        bool differ = max(abs(gap), abs(gap_latest)) > 0.1 * nearness_of_pixel(vec3(0.0, 0.0, b.plane.x));
+        bool meet = (at_edge || differ && (passed || gap * gap_latest < 0.0)) && min(a.plane.x, b.plane.x) > 0.5 * NOTHING;
         until = meet ? max(mix(scan.since, latest, gap / (gap - gap_latest)), 0.0) : max(scan.since, sqr(0.5 * (sqrt(a.s) + sqrt(b.s))));
     }
     if (a.plane.x > 0.5 * NOTHING && a.pixel != ivec2(scan.origin.xy)) {

@@ -11,8 +11,9 @@
 // outside of every edge that they run along.
 //
 // What has passed an edge is inside a thing, having met a side that the eye does not see, if it is before that thing's back: the
-// next layer's plane where that shows a back; a front before no back is a sheet (gather_lib.glsl). Where no layer tells, things are
-// `thickness` × the ray's length thick.
+// next layer's plane where that shows a back. A front before nothing is a sheet. A front before another front may be either, and
+// is `thickness` × the ray's length thick, as all things where there is no layer behind: its light is a better guess than
+// none (Sponza's Glossy Indirect: relMSE .79, .87 as sheets).
 
 #include "engines/ssdo/screen_lib.glsl"
 
@@ -106,7 +107,7 @@ Traced trace(vec3 start_ws, vec3 direction_ws, float reach, float thickness)
                         bool inside = depth_of_nearness(p.z) - depth_of_nearness(surface) <= thickness * t;
 #if HAS_SSDO_PLANES_2
                         vec4 end = texelFetch(ssdo_planes_2, pixel, 0);
-                        inside = end.w < 0.0 && p.z > plane_near(end, pixel, p.xy);
+                        inside = end.w < 0.0 ? p.z > plane_near(end, pixel, p.xy) : inside && end.w > 0.0;
 #endif
                         s_hit = inside && p.z - surface < -c.rounding ? s : NO_CROSSING;
                     }

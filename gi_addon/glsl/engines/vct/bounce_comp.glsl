@@ -8,7 +8,7 @@ layout(local_size_x = 4, local_size_y = 4, local_size_z = 4) in;
 layout(binding = 12) uniform sampler3D light_now;
 layout(binding = 13) uniform sampler3D back_now;
 
-// E/π at a point of a sheet with normal `n`: N cones of equal weight, as in diffuse_lib.glsl, turned from sheet to sheet.
+// E/π, in units, at a point of a sheet with normal `n`: N cones of equal weight, as in diffuse_lib.glsl, turned from sheet to sheet.
 vec3 gathered(Grid grid, vec3 p, vec3 n, float leaving, uint turn)
 {
     mat3 frame = frame_from_normal(n);
@@ -19,7 +19,7 @@ vec3 gathered(Grid grid, vec3 p, vec3 n, float leaving, uint turn)
         Cone cone = Cone(p + LIFT * n, d, spread, 1e30, leaving);
         sum += trace_cone(light_now, back_now, voxel_sheets, voxel_extents, voxel_kinds, grid, cone).radiance;
     }
-    return sum / float(cone_count);
+    return sum / (float(cone_count) * radiance_unit);
 }
 
 void main()

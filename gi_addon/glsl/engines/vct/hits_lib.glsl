@@ -50,12 +50,13 @@ vec3 box_normal(Cone cone, Grid grid)
     return -sign(d[axis]) * axis_vector(axis);
 }
 
-// Traces run `run` of cones from a point.
+// Traces run `run` of cones from a point. They are as wide as their share of all that count there: of SIDE × SIDE blocks'. Wider
+// ones would bring light around thin walls, from the lit side of what goes on behind them.
 void trace_hits(vec3 position_ws, vec3 n, vec3 ng, uint run, out uvec4 hits[CONES])
 {
     Grid grid = voxel_grid();
     mat3 frame = frame_from_normal(n);
-    Cone cone = surface_cone(grid, position_ws, ng, n, set_spread(), 1e30);
+    Cone cone = surface_cone(grid, position_ws, ng, n, cone_spread(1.0 / (float(cone_count * SIDE * SIDE) * cone_sets)), 1e30);
     for (int i = 0; i < CONES; ++i) {
         cone.direction = frame * cone_direction(run + uint(i));
         hits[i] = uvec4(0u);

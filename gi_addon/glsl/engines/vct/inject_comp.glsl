@@ -6,7 +6,7 @@
 // before it (blocked), or behind it (no surface there). So
 //     L = Σ_lit B/π / (lit + blocked)
 // with B the radiosity of the texel, albedo × irradiance × N·L: no resolution is in it, and a sheet half in shadow gives half
-// of its light.
+// of its light. What shines through a translucent sheet leaves by its other side.
 
 #include "engines/vct/volume_lib.glsl"
 #if HAS_RSM_DEPTH
@@ -28,12 +28,19 @@ const float FACING = 0.5;
 // A texel that is so near that it may show another surface beside the point speaks for it if nothing else does.
 const float BESIDE_WEIGHT = 1e-3;
 
+// What a light does to one side of a sheet.
 struct Lit {
-    vec4 sum;      // radiance, number
-    float blocked;
+    vec4 sum;      // radiance that is sent back, number of points that it shines on
+    vec3 through;  // radiance that leaves the other side
+    float blocked; // points that it does not
 };
 
-// What light of view `v` at point `p` of a sheet of normal `n` shows, added to the side that it shines on.
+const Lit UNLIT = Lit(vec4(0.0), vec3(0.0), 0.0);
+
+Lit sum_of(Lit a, Lit b) { return Lit(a.sum + b.sum, a.through + b.through, a.blocked + b.blocked); }
+
+// What light of view `v` at point `p` of a sheet of normal `n` shows, added to the side that it shines on. Texels of what light
+// shines through stand for one of its sides each, for both (rsm_frag.glsl).
 void ask_view(int index, vec3 p, vec3 n, float covered, inout Lit front, inout Lit back)
 {
     LightView v = rsm_views[index];
@@ -55,7 +62,8 @@ void ask_view(int index, vec3 p, vec3 n, float covered, inout Lit front, inout L
     }
     bool on_front = dot(ray, n) < 0.0;
     vec3 out_of = on_front ? n : -n;
-    bool on_sheet = abs(dot(hit - p, n)) <= ON_SHEET * grid_cell && dot(t.normal_ws, out_of) > FACING;
+    bool through = facing > 0.0;
+    bool on_sheet = abs(dot(hit - p, n)) <= ON_SHEET * grid_cell && dot(through ? -t.normal_ws : t.normal_ws, out_of) > FACING;
     bool beside = !on_sheet && dot(hit - p, hit - p) <= t.area;
     bool before = dot(hit - p, ray) < 0.0;
     if (!on_sheet && !beside && !before) {
@@ -70,19 +78,21 @@ void ask_view(int index, vec3 p, vec3 n, float covered, inout Lit front, inout L
             light.rgb *= 1.0 - covered;
         }
     }
-    float blocked = on_sheet || beside ? 0.0 : 1.0;
+    Lit here = Lit(vec4(through ? vec3(0.0) : light.rgb, light.a), through ? light.rgb : vec3(0.0),
+                   on_sheet || beside ? 0.0 : 1.0);
     if (on_front) {
-        front.sum += light;
-        front.blocked += blocked;
+        front = sum_of(front, here);
     } else {
-        back.sum += light;
-        back.blocked += blocked;
+        back = sum_of(back, here);
     }
 }
 
-vec3 lit_mean(Lit lit)
+// What leaves the side `near` of a sheet, in units of the volumes: of what shines on it, and through from the side `far`.
+vec3 leaving_mean(Lit near, Lit far)
 {
-    return lit.sum.a > 0.0 ? lit.sum.rgb / (lit.sum.a + lit.blocked) : vec3(0.0);
+    vec3 sent = near.sum.a > 0.0 ? near.sum.rgb / (near.sum.a + near.blocked) : vec3(0.0);
+    vec3 through = far.sum.a > 0.0 ? far.through / (far.sum.a + far.blocked) : vec3(0.0);
+    return (sent + through) / radiance_unit;
 }
 
 // No point of a cell, a ball of radius √3/2 cells, is in a view whose span its middle lies farther outside of.
@@ -97,6 +107,10 @@ bool outside_view(LightView v, vec3 center)
 }
 #endif
 
+// Where half floats end. The unit keeps light below (engines/vct.py: radiance_unit) but for what lies nearer to a lamp than a
+// quarter of a cell: that is as bright as what lies there.
+const float HALF_END = 65504.0;
+
 void main()
 {
     ivec3 cell = ivec3(gl_GlobalInvocationID);
@@ -110,7 +124,7 @@ void main()
     }
     vec3 emission = vec3(0.0);
 #if HAS_VOXEL_EMISSION
-    emission = texelFetch(voxel_emission, cell, 0).rgb; // by both sides of a surface
+    emission = texelFetch(voxel_emission, cell, 0).rgb * emission_scale; // by both sides of a surface
 #endif
     vec3 center = grid_low + (vec3(cell) + 0.5) * grid_cell;
     vec4 backs = vec4(0.0);
@@ -130,8 +144,8 @@ void main()
             }
 #endif
             vec3 n = sheet_normal(sheet, part);
-            Lit lit_front = Lit(vec4(0.0), 0.0);
-            Lit lit_back = Lit(vec4(0.0), 0.0);
+            Lit lit_front = UNLIT;
+            Lit lit_back = UNLIT;
             for (int index = 0; index < view_count; ++index) {
                 bool outside = outside_view(rsm_views[index], center);
                 for (int square = 0; square < (outside ? 0 : 16); ++square) {
@@ -142,9 +156,9 @@ void main()
                 }
                 bool last = index + 1 == view_count || rsm_views[index + 1].light != rsm_views[index].light;
                 if (last) {
-                    front += lit_mean(lit_front);
-                    back += lit_mean(lit_back);
-                    lit_front = lit_back = Lit(vec4(0.0), 0.0);
+                    front += leaving_mean(lit_front, lit_back);
+                    back += leaving_mean(lit_back, lit_front);
+                    lit_front = lit_back = UNLIT;
                 }
             }
 #endif
@@ -159,8 +173,8 @@ void main()
             backs += vec4(back, 1.0) * share;
         }
         if (fronts.a > 0.0 || first_time == 1) {
-            imageStore(voxel_radiance, part_texel(cell, grid_size, part >> 1, part & 1), fronts);
+            imageStore(voxel_radiance, part_texel(cell, grid_size, part >> 1, part & 1), clamp(fronts, -HALF_END, HALF_END));
         }
     }
-    imageStore(voxel_back, cell, backs);
+    imageStore(voxel_back, cell, clamp(backs, -HALF_END, HALF_END));
 }

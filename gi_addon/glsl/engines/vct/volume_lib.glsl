@@ -5,7 +5,7 @@
 // squares of the face it covers.
 //
 // Light is kept in an atlas of six parts, sheets' sides +x … −z; part (side, axis) lies at (side, 0, axis) of 2 × 1 × 3.
-// Alpha is the share of the face that the sheet covers, rgb radiance × alpha. Light that leaves sheets by their backs (a sheet
+// Alpha is the share of the face that the sheet covers, rgb radiance × alpha, in units of `radiance_unit`. Light that leaves sheets by their backs (a sheet
 // without thickness, lit from behind) is in a volume of its own.
 
 #include "lib/math_lib.glsl"
