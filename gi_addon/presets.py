@@ -47,7 +47,7 @@ PRESETS: dict[str, Preset] = {
         "Preview", "The fastest picture worth looking at: small maps, few samples, one bounce",
         {**_OURS, "samples": 1, "viewport_samples": 8, "bounces": 1, "gather_scale": 8, "shadows.resolution": 512, "ao.steps": 6,
          "world.samples": 2, "world.resolution": 256,
-         "rsm.resolution": 256, "rsm.samples": 64, "lpv.resolution": 16, "vct.resolution": 32,
+         "rsm.resolution": 256, "rsm.samples": 48, "lpv.resolution": 16, "vct.resolution": 32,
          "vct.cones": 8, "ssdo.samples": 48, "ssdo.layers": 1, "ssdo.margin": 0.1},
     ),
     # Against a Cycles that bounces on, later bounces are worth more than all else, and in grids they cost next to nothing
