@@ -178,7 +178,7 @@ def _sum_up(frame: Frame, reduce, texture) -> None:
 
 
 # Points of the picture, and of surfaces where light bounces on, that virtual lights are drawn for.
-_RECEIVERS = 64
+_RECEIVERS = 256
 _MOST_BLOCKS = 512
 
 
