@@ -21,7 +21,7 @@ from ..gpu_types import LIGHT_SUN, LIGHT_WORLD
 from ..graph import Optional, Pass, Planned, Texture, Uniform, glsl_name
 from ..passes.ao import AOBlur, AOGeneration
 from ..passes.brdf_tables import BRDFTables
-from ..passes.direct_lighting import DirectLighting, TranslucentLighting
+from ..passes.direct_lighting import DirectLighting, TranslucentLighting, set_lamps
 from ..passes.gbuffer import CameraTint, GBuffer, GBufferMips, TranslucentBack, TranslucentLayer, TranslucentTint
 from ..passes.lights import LightList, ShadowMaps, ShadowTint
 from ..passes.occupancy import Occupancy
@@ -40,7 +40,7 @@ from ..passes.screen import (
     no_translucency,
 )
 from ..passes.smoothing import BlockSmoothing, raw_gather
-from ..passes.volumetric import Volumetric
+from ..passes.volumetric import Volumetric, medium_defines
 from ..passes.world_guide import WorldGuide
 from ..passes.world_rays import WorldRays
 from ..settings import Settings
@@ -455,8 +455,28 @@ REFLECTED_SOURCES = Texture("reflected.sources", "reflected_sources", "radiance 
                             "of emissive pixels, W/(m²·sr)", "rgba32f", _screen)  # fmt: skip
 
 
-# What a ray through the depth buffer is traced in, and the light that it finds (trace_lib.glsl).
-_TRACED = ("ssdo.planes", "ssdo.pyramid", "ssdo.shaded", Optional(_planes(2)), Optional("ssdo.layer2.sent"))
+# What a ray through the depth buffer is traced in, and the light that it finds (trace_lib.glsl, met_lib.glsl).
+_TRACED = (
+    "ssdo.planes", "ssdo.pyramid", "ssdo.shaded", Optional(_planes(2)), Optional("ssdo.layer2.sent"), "gbuffer.depth",
+    "gbuffer.normal", Optional("gbuffer.diffuse"), Optional("gbuffer.set"), Optional("lights"), Optional("lights.views"),
+    Optional("shadow.depth"), Optional("shadow.tint"), Optional("rsm.depth"),
+)  # fmt: skip
+_TRACED_UNIFORMS = (
+    Uniform("ssdo_thickness", "float", "thickness of what the screen shows, as a share of its distance from the receiver"),
+    *DirectLighting.uniforms,
+)
+
+
+def _traced_defines(facts: Facts) -> dict[str, int]:
+    """Lamps are looked up where a ray ends if shadow maps tell all about them there."""
+    settings = facts.settings
+    mapped = settings.ssdo.shadows == "MAPS" or not settings.use_shadows
+    return {**medium_defines(facts), "LAMPS_AT_HITS": int(mapped and facts.lit and facts.diffuse)}
+
+
+def _set_traced(frame: Frame, planned: Planned, program) -> None:
+    set_lamps(frame, planned, program)
+    frame.set(program, ssdo_thickness=planned.facts.settings.ssdo.thickness)
 
 
 class Reflections(Pass):
@@ -464,14 +484,12 @@ class Reflections(Pass):
 
     title = "SSDO Reflections"
     reads = (
-        *_TRACED, "gbuffer.depth", "gbuffer.normal", *LOBE, Optional("gbuffer.emission", ("sources.traced",)),
+        *_TRACED, *LOBE, Optional("gbuffer.emission", ("sources.traced",)),
     )  # fmt: skip
     writes = (
         GLOSSY_TRACED, SOURCES_TRACED, GLOSSY_RAY,
     )  # fmt: skip
-    uniforms = (
-        Uniform("ssdo_thickness", "float", "thickness of what the screen shows, as a share of its distance from the receiver"),
-    )
+    uniforms = _TRACED_UNIFORMS
     shaders = {"main": {"compute": "engines/ssdo/reflections_comp.glsl"}}
 
     def absent(self, facts: Facts) -> str | None:
@@ -479,6 +497,7 @@ class Reflections(Pass):
 
     def defines(self, facts: Facts) -> dict[str, int]:
         return {
+            **_traced_defines(facts),
             "TRACE_WORLD": int(facts.screen_sources and not facts.world_black),
             "TRACE_EMISSION": int(facts.screen_sources and facts.emissive_light),
         }
@@ -487,7 +506,7 @@ class Reflections(Pass):
         world = bool(self.defines(planned.facts)["TRACE_WORLD"])
         with _world(frame, planned, world) as virtual:
             program = frame.program(planned, virtual=virtual)
-            frame.set(program, ssdo_thickness=planned.facts.settings.ssdo.thickness)
+            _set_traced(frame, planned, program)
             frame.compute(planned, program, planned.facts.resolution)
 
 
@@ -543,12 +562,15 @@ class Refraction(Pass):
         *_TRACED, *REFRACTING, Optional("gbuffer.emission"),
     )  # fmt: skip
     writes = (TRANSMISSION_INDIRECT,)
-    uniforms = Reflections.uniforms
+    uniforms = _TRACED_UNIFORMS
     shaders = {"main": {"compute": "engines/ssdo/refraction_comp.glsl"}}
+
+    def defines(self, facts: Facts) -> dict[str, int]:
+        return _traced_defines(facts)
 
     def run(self, frame: Frame, planned: Planned) -> None:
         program = frame.program(planned)
-        frame.set(program, ssdo_thickness=planned.facts.settings.ssdo.thickness)
+        _set_traced(frame, planned, program)
         frame.compute(planned, program, planned.facts.resolution)
 
 

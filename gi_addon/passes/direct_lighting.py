@@ -12,6 +12,17 @@ from .screen import LIGHT, ScreenPass, _screen
 from .volumetric import MEDIUM_UNIFORMS, medium_defines, set_medium
 
 
+def set_lamps(frame: Frame, planned: Planned, program) -> None:
+    """Set ``DirectLighting.uniforms``: what lib/lamps_lib.glsl asks for."""
+    set_medium(frame, program, planned.facts)
+    frame.set(
+        program,
+        light_count=len(planned.facts.rig.sources),
+        softness=planned.facts.settings.shadows.softness,
+        filter_turn=float(sobol_2d(frame.subframe, 3)[0]) * 6.2831853,
+    )
+
+
 class DirectLighting(ScreenPass):
     title = "Direct Lighting Computation"
     figure = "Direct Lighting Computation"
@@ -45,13 +56,7 @@ class DirectLighting(ScreenPass):
         return None if facts.lit else "no light shines"
 
     def prepare(self, frame: Frame, planned: Planned, program) -> None:
-        set_medium(frame, program, planned.facts)
-        frame.set(
-            program,
-            light_count=len(planned.facts.rig.sources),
-            softness=planned.facts.settings.shadows.softness,
-            filter_turn=float(sobol_2d(frame.subframe, 3)[0]) * 6.2831853,
-        )
+        set_lamps(frame, planned, program)
 
 
 class TranslucentLighting(ScreenPass):

@@ -7,12 +7,7 @@
 #include "lib/view_lib.glsl"
 #include "lib/bsdf_lib.glsl"
 #include "lib/sequence_lib.glsl"
-#include "lib/shadow_lib.glsl"
-#include "lib/tint_lib.glsl"
-#if HAS_MEDIUM
-#include "lib/medium_lib.glsl"
-#endif
-
+#include "lib/lamps_lib.glsl"
 #if HAS_SSDO_PLANES
 #include "engines/ssdo/shadow_lib.glsl"
 #endif
@@ -46,47 +41,38 @@ void main()
 #endif
 #if HAS_GBUF_SET
         uint lit_with = uint(texelFetch(gbuf_set, pixel, 0).r * 255.0 + 0.5);
+#else
+        uint lit_with = 0u;
 #endif
         for (int i = 0; i < light_count; ++i) {
             Light light = lights[i];
-#if HAS_GBUF_SET
-            if ((light.receivers >> lit_with & 1u) == 0u) {
+            LampLight lamp = lamp_light(light, position_ws, n, ng, depth_bulge.g);
+            if (lamp.cosine <= 0.0 || !lamp_lights(light, lit_with)) {
                 continue;
             }
-#endif
-            vec3 l;
-            float angle;
-            vec3 arriving = light_arriving(light, position_ws, l, angle);
-            float cos_l = dot(n, l);
-            // Light from behind a flat triangle does not reach its front, whatever the shading normal says. A triangle
-            // that stands for a curved surface is lit up to where that surface turns away.
-            bool behind = dot(ng, l) <= 0.0;
-            if (cos_l <= 0.0 || (behind && depth_bulge.g <= 0.0) || max3(abs(arriving)) <= 0.0) {
-                continue;
-            }
-            vec3 receiver_ws = position_ws + n * depth_bulge.g;
-            vec3 receiver_ng = behind ? n : ng;
+            vec3 l = lamp.direction;
+            vec3 arriving = lamp.arriving;
             float visible = 1.0;
 #if HAS_SHADOW_CONES
             visible = texelFetch(shadow_cones, ivec3(pixel, i), 0).r;
 #else
-            visible = light_share(light, receiver_ws, receiver_ng, softness, turn);
+            visible = light_share(light, lamp.receiver_ws, lamp.receiver_ng, softness, turn);
 #endif
 #if HAS_MEDIUM
             arriving *= medium_transmittance(position_ws, l, light_distance(light, position_ws));
 #endif
 #if HAS_SSDO_PLANES
             if (visible > 0.0) {
-                visible *= screen_visibility(light, receiver_ws, l, fract(turn * 0.159154943 + 0.618034 * float(i))); // 1/2π
+                visible *= screen_visibility(light, lamp.receiver_ws, l, fract(turn * 0.159154943 + 0.618034 * float(i))); // 1/2π
             }
 #endif
-            open_light += arriving * cos_l * light.diffuse;
+            open_light += arriving * lamp.cosine * light.diffuse;
             arriving *= light_tint(light, position_ws);
-            vec3 irradiance = arriving * cos_l;
+            vec3 irradiance = arriving * lamp.cosine;
             lit_light += irradiance * visible * light.diffuse;
 #if HAS_DIRECT_GLOSSY
             if (has_lobe && visible > 0.0) {
-                glossy += light.glossy * arriving * visible * gain * ggx_eval(lobe, widened_alpha(alpha, angle), n, v, l);
+                glossy += light.glossy * arriving * visible * gain * ggx_eval(lobe, widened_alpha(alpha, lamp.angle), n, v, l);
             }
 #endif
         }

@@ -5,10 +5,7 @@
 #include "lib/view_lib.glsl"
 #include "lib/math_lib.glsl"
 #include "lib/sequence_lib.glsl"
-#include "lib/shadow_lib.glsl"
-#if HAS_MEDIUM
-#include "lib/medium_lib.glsl"
-#endif
+#include "lib/lamps_lib.glsl"
 
 void main()
 {
@@ -25,29 +22,11 @@ void main()
     // Towards the far side.
     vec3 n = -octahedral_decode(normals.xy);
     vec3 ng = -octahedral_decode(normals.zw);
-    vec3 irradiance = vec3(0.0);
 #if HAS_TRANSLUCENT_SET
     uint lit_with = uint(texelFetch(translucent_set, pixel, 0).r * 255.0 + 0.5);
+#else
+    uint lit_with = 0u;
 #endif
-    for (int i = 0; i < light_count; ++i) {
-        Light light = lights[i];
-#if HAS_TRANSLUCENT_SET
-        if ((light.receivers >> lit_with & 1u) == 0u) {
-            continue;
-        }
-#endif
-        vec3 l;
-        float angle;
-        vec3 arriving = light_arriving(light, position_ws, l, angle);
-        float cos_l = dot(n, l);
-        if (cos_l <= 0.0 || dot(ng, l) <= 0.0 || max3(arriving) <= 0.0) {
-            continue;
-        }
-        float visible = light_share(light, position_ws, ng, softness, turn);
-#if HAS_MEDIUM
-        arriving *= medium_transmittance(position_ws, l, light_distance(light, position_ws));
-#endif
-        irradiance += light.diffuse * arriving * (cos_l * visible);
-    }
+    vec3 irradiance = lamps_irradiance(position_ws, n, ng, 0.0, lit_with, turn);
     transmission_direct = vec4(irradiance * INV_PI * texelFetch(translucent_color, pixel, 0).rgb, 1.0);
 }

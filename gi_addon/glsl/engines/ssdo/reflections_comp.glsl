@@ -7,6 +7,7 @@
 // hits fade to it at the picture's edge: `reflected_sources`, Glossy Direct in Cycles' sense.
 
 #include "engines/ssdo/trace_lib.glsl"
+#include "engines/ssdo/met_lib.glsl"
 #include "lib/bsdf_lib.glsl"
 #include "lib/sequence_lib.glsl"
 #include "lib/reflection_lib.glsl"

@@ -3,6 +3,7 @@
 // normals. Where the ray finds nothing on the screen, what is straight behind shows.
 
 #include "engines/ssdo/trace_lib.glsl"
+#include "engines/ssdo/met_lib.glsl"
 #include "lib/bsdf_lib.glsl"
 #include "lib/sequence_lib.glsl"
 #include "lib/refraction_lib.glsl"

@@ -134,26 +134,3 @@ Traced trace(vec3 start_ws, vec3 direction_ws, float reach, float thickness)
     }
     return hit;
 }
-
-// Whether what was met shows its front to a point of screen coordinates `from`.
-bool met_front(Traced hit, vec3 from)
-{
-    vec4 plane = texelFetch(ssdo_planes, hit.pixel, 0);
-#if HAS_SSDO_PLANES_2
-    plane = hit.hidden ? texelFetch(ssdo_planes_2, hit.pixel, 0) : plane;
-#endif
-    return faces(plane, hit.pixel, from);
-}
-
-// Radiance that leaves it, without its emission, W/(m²·sr).
-vec3 met_light(Traced hit)
-{
-    if (hit.hidden) {
-#if HAS_SSDO_LAYER2_SENT
-        return texelFetch(ssdo_layer2_sent, hit.pixel, 0).rgb;
-#else
-        return vec3(0.0);
-#endif
-    }
-    return texelFetch(ssdo_shaded, hit.pixel, 0).rgb;
-}
