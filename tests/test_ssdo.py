@@ -534,6 +534,31 @@ def test_a_mirror_shows_the_wall_down_to_its_foot(gl):
     assert lit[:, 30:66][foot] == pytest.approx(0.8 * 5.0 / np.sqrt(2.0) / np.pi, rel=0.02)
 
 
+def test_a_mirror_shows_a_lamps_light_where_it_falls(gl):
+    """A lamp near a wall lights it ever less from pixel to pixel. What the mirror floor shows of each point is that point's
+    own ρ E/π, not the nearest pixel's."""
+    b = scenes.SceneBuilder()
+    b.quads(FLOOR[None], scenes.principled(Metallic=1.0, Roughness=0.0, Base_Color=(1, 1, 1, 1)))
+    wall, across, up = np.array([-1.0, 1.0, 0.0]), np.array([2.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
+    b.quads(np.array([[wall, wall + across, wall + across + up, wall + up]]), scenes.diffuse((0.8,) * 3))
+    lamp, power = np.array([0.1, 0.8, 0.4]), 10.0
+    b.light(scenes.point_light(tuple(lamp), power))
+    scene = b.build(scenes.perspective((0, -3.2, 1.0), (0, 0.3, 0.4), 0.9))
+    p = ssdo(scene, "Glossy Indirect", "Glossy Color", samples=1, use_indirect_diffuse=False, use_shadows=False).passes
+    lit = (p["Glossy Indirect"] * p["Glossy Color"])[..., 0]
+    eye, d = camera_rays(scene.camera, lit.shape[::-1])
+    t, _, _ = hits(eye, d, FLOOR[0], FLOOR[1] - FLOOR[0], FLOOR[3] - FLOOR[0])
+    at = eye + np.where(np.isfinite(t), t, 0.0)[..., None] * d
+    s, u, v = hits(at, d * [1, 1, -1], wall, across, up)
+    inside = np.isfinite(t) & np.isfinite(s) & (np.abs(u - 0.5) < 0.45) & (v > 0.05) & (v < 0.9)
+    assert inside.sum() > 100
+    to_lamp = lamp - (wall + u[..., None] * across + v[..., None] * up)
+    d2 = (to_lamp**2).sum(-1)
+    exact = 0.8 / np.pi * power / (4.0 * np.pi) * -to_lamp[..., 1] / d2**1.5
+    # At the last pixels of the wall's foot a ray may end a pixel early.
+    assert np.quantile(np.abs(lit[inside] / exact[inside] - 1.0), 0.99) < 0.02
+
+
 def test_a_mirrored_sheet_is_as_wide_as_it_is(gl):
     """Rays that run along a sheet's edge pass behind it, as near as they do: what a mirror floor shows of two narrow sheets has
     the area of the exact picture, 3 %."""
