@@ -38,9 +38,7 @@ void main()
     found = blocks == 4 || TARGET == TARGET_BOUNCE && blocks > 0;
 #endif
     if (!found) {
-        // No neighbour adds its slices here: each sub-frame takes those of the next.
-        ivec2 place = pixel + view.pixel_offset + (ivec2(view.subframe) >> ivec2(0, 1));
-        radiance = gather_screen(position_ws, n, ng, view_direction_ws(uv), place, max(ssdo_slices / FRESH, 1)).radiance;
+        radiance = gather_screen(position_ws, n, ng, view_direction_ws(uv), pixel + view.pixel_offset, max(ssdo_slices / FRESH, 1)).radiance;
     }
     LIGHT = vec4(radiance, found ? INTERPOLATED : GATHERED);
 }
