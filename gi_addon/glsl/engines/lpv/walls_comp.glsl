@@ -31,13 +31,21 @@ bool goes_on(uint here, vec4 wall)
     }
     middle /= float(max(bitCount(here), 1));
     bool whole = true;
+    bool any_inside = false;
+    float low = along;
+    float high = 0.0;
     for (int i = 0; i < LPV_POINTS * LPV_POINTS; ++i) {
         // Distance along the normal from the ends of the slab.
         float height = wall.y * along - dot(wall.zw, vec2(i % LPV_POINTS, i / LPV_POINTS) - middle) / float(LPV_POINTS);
         bool inside = min(height, along - height) > BEND;
         whole = whole && (!inside || ((here >> i) & 1u) != 0u);
+        any_inside = any_inside || inside;
+        low = min(low, height);
+        high = max(high, height);
     }
-    return whole;
+    // Of a wall that has no point in the slab's inside nothing is known, unless it crosses the slab from end to end between points. One
+    // that lies in the slab's end and stops there (a plate's edge) blocks by what it covers, which changes evenly as it moves.
+    return whole && (any_inside || high - low >= along);
 }
 
 void main()
