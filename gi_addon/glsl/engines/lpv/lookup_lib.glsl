@@ -11,6 +11,17 @@ struct VolumeSample {
     float weight; // of the eight cells, how much stands on the open side of the walls
 };
 
+// The i-th of the eight cells around grid point `at` and its trilinear weight, 0 outside of the grid.
+float corner_weight(int i, vec3 at, out ivec3 cell)
+{
+    vec3 base = floor(at - 0.5);
+    vec3 f = at - 0.5 - base;
+    ivec3 corner = ivec3(i & 1, (i >> 1) & 1, i >> 2);
+    cell = ivec3(base) + corner;
+    vec3 t = mix(1.0 - f, f, vec3(corner));
+    return inside_grid(cell, grid_size) ? t.x * t.y * t.z : 0.0;
+}
+
 // The eight cells around grid point `at`, trilinear; a cell behind the tangent plane of `surface` (a grid point, unit normal
 // `n`) does not count, nor one behind a wall that stands between `at` and its layer, in its own column or in the one of `at`.
 VolumeSample volume_sample(vec3 at, vec3 surface, vec3 n)
@@ -20,14 +31,10 @@ VolumeSample volume_sample(vec3 at, vec3 surface, vec3 n)
         s.sh[c] = vec3(0.0);
     }
     s.weight = 0.0;
-    vec3 base = floor(at - 0.5);
-    vec3 f = at - 0.5 - base;
     for (int i = 0; i < 8; ++i) {
-        ivec3 corner = ivec3(i & 1, (i >> 1) & 1, i >> 2);
-        ivec3 cell = ivec3(base) + corner;
-        vec3 t = mix(1.0 - f, f, vec3(corner));
-        float weight = t.x * t.y * t.z;
-        if (!inside_grid(cell, grid_size) || weight <= 0.0) {
+        ivec3 cell;
+        float weight = corner_weight(i, at, cell);
+        if (weight <= 0.0) {
             continue;
         }
         // From the plane to half a cell in front of it, so that no cell appears at once.
@@ -53,14 +60,10 @@ VolumeSample volume_sample(vec3 at, vec3 surface, vec3 n)
 vec4 air_sample(vec3 at, float weights[SH_COUNT])
 {
     vec4 sum = vec4(0.0);
-    vec3 base = floor(at - 0.5);
-    vec3 f = at - 0.5 - base;
     for (int i = 0; i < 8; ++i) {
-        ivec3 corner = ivec3(i & 1, (i >> 1) & 1, i >> 2);
-        ivec3 cell = ivec3(base) + corner;
-        vec3 t = mix(1.0 - f, f, vec3(corner));
-        float weight = t.x * t.y * t.z;
-        if (!inside_grid(cell, grid_size) || weight <= 0.0) {
+        ivec3 cell;
+        float weight = corner_weight(i, at, cell);
+        if (weight <= 0.0) {
             continue;
         }
 #if HAS_LPV_WALLS
