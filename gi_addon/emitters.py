@@ -39,18 +39,10 @@ class Emitters:
         """The emissive triangles of ``scene``; ``emission`` is the mean radiance (3,) of each material. Triangles
         without area are left out."""
         corners, radiance, outward = [], [], []
-        inst = scene.instances
-        for i in range(len(inst)):
-            mesh, used = scene.meshes[inst.mesh[i]], inst.materials[i]
-            if not inst.visibility[i] & DIFFUSE or not np.isfinite(inst.matrix[i]).all() or not used:
-                continue
-            for slot, first, count in mesh.slots:
-                value = emission[used[min(int(slot), len(used) - 1)]]
-                if count and (value > 0.0).any():
-                    triangles = mesh.positions[mesh.triangles[first : first + count]].astype("f8")
-                    corners.append(triangles @ inst.matrix[i, :3, :3].T + inst.matrix[i, :3, 3])
-                    radiance.append(np.broadcast_to(value, (count, 3)))
-                    outward.append(np.full(count, _orientation(corners[-1])))
+        for _, material, triangles in scene.world_triangles(DIFFUSE, [(value > 0.0).any() for value in emission]):
+            corners.append(triangles)
+            radiance.append(np.broadcast_to(emission[material], (len(triangles), 3)))
+            outward.append(np.full(len(triangles), _orientation(triangles)))
         if not corners:
             return Emitters.none()
         found = Emitters(np.concatenate(corners), np.concatenate(radiance))

@@ -14,6 +14,7 @@ import io
 import itertools
 import json
 import zipfile
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -314,6 +315,20 @@ class Scene:
     def triangle_count(self) -> int:
         """Triangles drawn, instances counted each."""
         return int(sum(len(self.meshes[m].triangles) for m in self.instances.mesh))
+
+    def world_triangles(self, visibility: int, wanted: Sequence[bool]) -> Iterator[tuple[int, int, np.ndarray]]:
+        """Instance, material and corners (T, 3, 3) in world space of what is visible to one of ``visibility`` and has a
+        material that is ``wanted``, slot by slot; what has no finite place is left out."""
+        inst = self.instances
+        for i in range(len(inst)):
+            mesh, used = self.meshes[inst.mesh[i]], inst.materials[i]
+            if not inst.visibility[i] & visibility or not used or not np.isfinite(inst.matrix[i]).all():
+                continue
+            for slot, first, count in mesh.slots:
+                material = used[min(int(slot), len(used) - 1)]
+                if count and wanted[material]:
+                    triangles = mesh.positions[mesh.triangles[first : first + count]].astype("f8")
+                    yield i, material, triangles @ inst.matrix[i, :3, :3].T + inst.matrix[i, :3, 3]
 
     def instance_bounds(self) -> np.ndarray:
         """World-space boxes (N, 2, 3) of all instances."""

@@ -68,19 +68,12 @@ def surface_points(scene: Scene, count: int, per_set: int) -> np.ndarray:
         for m in scene.materials
     ]  # fmt: skip
     corners, colors = [], []
-    instances = scene.instances
-    for i in range(len(instances)):
-        mesh, used = scene.meshes[instances.mesh[i]], instances.materials[i]
-        if not instances.visibility[i] & DIFFUSE or not used or not np.isfinite(instances.matrix[i]).all():
-            continue
-        for slot, first, size in mesh.slots:
-            color = albedos[used[min(int(slot), len(used) - 1)]]
-            if size and (color > 0.0).any():
-                triangles = mesh.positions[mesh.triangles[first : first + size]].astype("f8")
-                corners.append(triangles @ instances.matrix[i, :3, :3].T + instances.matrix[i, :3, 3])
-                # A mirrored triangle winds the other way, its front stays.
-                mirrored = np.linalg.det(instances.matrix[i, :3, :3]) < 0.0
-                colors.append(np.broadcast_to(color[::-1] if mirrored else color, (size, 2, 3)))
+    for i, material, triangles in scene.world_triangles(DIFFUSE, [(color > 0.0).any() for color in albedos]):
+        corners.append(triangles)
+        # A mirrored triangle winds the other way, its front stays.
+        mirrored = np.linalg.det(scene.instances.matrix[i, :3, :3]) < 0.0
+        color = albedos[material]
+        colors.append(np.broadcast_to(color[::-1] if mirrored else color, (len(triangles), 2, 3)))
     if not corners:
         return out
     corners, colors = np.concatenate(corners), np.concatenate(colors)

@@ -1,5 +1,5 @@
 // What lamps send straight to a point of a surface, each through its shadow map by this sub-frame's point of it. Included where
-// `lights`, `light_count` and `softness` are declared.
+// `lights`, `light_count`, `softness` and `filter_turn` are declared, after sequence_lib.glsl.
 
 #include "lib/shadow_lib.glsl"
 #include "lib/tint_lib.glsl"
@@ -16,6 +16,12 @@ struct LampLight {
     vec3 receiver_ws;  // where, and on which plane, the shadow map is asked
     vec3 receiver_ng;
 };
+
+// The turn of a pixel's shadow filter in this sub-frame, rad.
+float shadow_turn(ivec2 pixel) { return filter_turn + TAU * unit_float(hash_u32(uvec2(pixel + view.pixel_offset))); }
+
+// The set that a pixel's surface is of (light linking).
+uint set_at(sampler2D sets, ivec2 pixel) { return uint(texelFetch(sets, pixel, 0).r * 255.0 + 0.5); }
 
 // Whether a lamp lights surfaces of the set `lit_with` (light linking).
 bool lamp_lights(Light light, uint lit_with) { return (light.receivers >> lit_with & 1u) != 0u; }

@@ -10,6 +10,20 @@ vec3 ray_direction_ws(vec2 uv) { return view.direction_ws + view.direction_u * u
 
 vec3 position_ws_from_depth(vec2 uv, float depth) { return ray_origin_ws(uv) + ray_direction_ws(uv) * depth; }
 
+// A pixel's ray from where the view begins to a depth, `end` units away; 1e30 where there is nothing (depth 0).
+struct EyeRay {
+    vec3 origin_ws;
+    vec3 direction;
+    float end;
+};
+
+EyeRay eye_ray(vec2 uv, float depth)
+{
+    vec3 ray = ray_direction_ws(uv);
+    float scale = length(ray);
+    return EyeRay(ray_origin_ws(uv) + ray * view.clip_start, ray / scale, depth > 0.0 ? (depth - view.clip_start) * scale : 1e30);
+}
+
 // View depth of a point: its distance along the view axis.
 float view_depth(vec3 position_ws) { return -(view.view_from_world * vec4(position_ws, 1.0)).z; }
 

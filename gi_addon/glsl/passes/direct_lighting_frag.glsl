@@ -22,7 +22,7 @@ void main()
     vec2 uv = gl_FragCoord.xy * view.inverse_resolution;
     vec2 depth_bulge = max(texelFetch(gbuf_depth, pixel, 0).rg, 0.0); // below 0 are marks
     float depth = depth_bulge.r;
-    float turn = filter_turn + TAU * unit_float(hash_u32(uvec2(pixel + view.pixel_offset)));
+    float turn = shadow_turn(pixel);
     vec3 diffuse = vec3(0.0);
     vec3 glossy = vec3(0.0);
     vec3 open_light = vec3(0.0);
@@ -40,7 +40,7 @@ void main()
         vec3 gain = has_lobe ? multiscatter_gain(brdf_energy, brdf_average, lobe, saturate(abs(dot(n, v)))) : vec3(0.0);
 #endif
 #if HAS_GBUF_SET
-        uint lit_with = uint(texelFetch(gbuf_set, pixel, 0).r * 255.0 + 0.5);
+        uint lit_with = set_at(gbuf_set, pixel);
 #else
         uint lit_with = 0u;
 #endif

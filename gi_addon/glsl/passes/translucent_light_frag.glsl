@@ -16,14 +16,14 @@ void main()
     if (depth <= 0.0 || texelFetch(translucent_medium, pixel, 0).g < 0.5) {
         return;
     }
-    float turn = filter_turn + TAU * unit_float(hash_u32(uvec2(pixel + view.pixel_offset)));
+    float turn = shadow_turn(pixel);
     vec3 position_ws = position_ws_from_depth(uv, depth);
     vec4 normals = texelFetch(translucent_normal, pixel, 0);
     // Towards the far side.
     vec3 n = -octahedral_decode(normals.xy);
     vec3 ng = -octahedral_decode(normals.zw);
 #if HAS_TRANSLUCENT_SET
-    uint lit_with = uint(texelFetch(translucent_set, pixel, 0).r * 255.0 + 0.5);
+    uint lit_with = set_at(translucent_set, pixel);
 #else
     uint lit_with = 0u;
 #endif

@@ -127,11 +127,10 @@ void main()
 #if HAS_GBUF_DEPTH
     depth = texelFetch(gbuf_depth, pixel, 0).r;
 #endif
-    vec3 ray = ray_direction_ws(uv);
-    float scale = length(ray);
-    vec3 direction = ray / scale;
-    vec3 origin_ws = ray_origin_ws(uv) + ray * view.clip_start;
-    float end = depth > 0.0 ? (depth - view.clip_start) * scale : 1e30;
+    EyeRay ray = eye_ray(uv, depth);
+    vec3 direction = ray.direction;
+    vec3 origin_ws = ray.origin_ws;
+    float end = ray.end;
     vec3 passes = medium_transmittance(origin_ws, direction, end);
 #if HAS_VOLUME_TRANSMITTANCE
     volume_transmittance = vec4(passes, 1.0);

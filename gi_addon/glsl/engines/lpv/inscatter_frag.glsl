@@ -17,14 +17,13 @@ void main()
 #if HAS_GBUF_DEPTH
     depth = texelFetch(gbuf_depth, pixel, 0).r;
 #endif
-    vec3 ray = ray_direction_ws(uv);
-    float scale = length(ray);
-    vec3 direction = ray / scale;
-    vec3 origin_ws = ray_origin_ws(uv) + ray * view.clip_start;
+    EyeRay ray = eye_ray(uv, depth);
+    vec3 direction = ray.direction;
+    vec3 origin_ws = ray.origin_ws;
     use_grid(0);
     // What light there is outside of the scene's grid it does not know.
     vec2 known = box_span((origin_ws - grid_origin) / grid_cell, direction / grid_cell, vec3(0.0), vec3(grid_size));
-    known = vec2(max(known.x, 0.0), min(known.y, depth > 0.0 ? (depth - view.clip_start) * scale : 1e30));
+    known = vec2(max(known.x, 0.0), min(known.y, ray.end));
     float offset = fract(step_turn + unit_float(hash_u32(uvec2(pixel + view.pixel_offset))));
     vec3 sum = vec3(0.0);
     for (int k = 0; k < MEDIA; ++k) {

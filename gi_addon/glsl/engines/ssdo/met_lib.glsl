@@ -36,9 +36,9 @@ vec3 met_light(Traced hit)
     vec3 ng = octahedral_decode(normals.zw);
     uint lit_with = 0u;
 #if HAS_GBUF_SET
-    lit_with = uint(texelFetch(gbuf_set, hit.pixel, 0).r * 255.0 + 0.5);
+    lit_with = set_at(gbuf_set, hit.pixel);
 #endif
-    float turn = filter_turn + TAU * unit_float(hash_u32(uvec2(hit.pixel + view.pixel_offset)));
+    float turn = shadow_turn(hit.pixel);
     vec4 plane = texelFetch(ssdo_planes, hit.pixel, 0);
     vec3 at_ws = ws_from_screen(vec3(hit.at, plane_near(plane, hit.pixel, hit.at)));
     vec3 middle_ws = position_ws_from_depth((vec2(hit.pixel) + 0.5) * view.inverse_resolution, depth_bulge.r);
