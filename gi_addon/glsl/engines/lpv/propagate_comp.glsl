@@ -24,18 +24,9 @@
 // and under 0.001 B from 16³ where 0.2 B is right, and finer grids are worse (tests/test_lpv.py). Light that keeps its direction
 // arrives.
 
-#include "engines/lpv/geometry_lib.glsl"
+#include "engines/lpv/transport_lib.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
-
-// min(1, M/P): the share of a step behind that is air.
-float step_share(vec3 w, vec3 n)
-{
-    vec3 parts = w * n;
-    float leaving = dot(max(parts, vec3(0.0)), vec3(1.0));
-    float meeting = -dot(min(parts, vec3(0.0)), vec3(1.0));
-    return leaving > 1e-6 ? min(meeting / leaving, 1.0) : 1.0;
-}
 
 void main()
 {
@@ -69,26 +60,21 @@ void main()
 #if HAS_LPV_AIR
     vec3 here = texelFetch(lpv_air, volume_texel(cell, 0), 0).rgb;
 #endif
-    float behind = whole;
-    float ahead = whole;
-    float open_ahead = whole;
+#if HAS_LPV_WALLS
+    vec4 walls[6];
+    cell_walls(cell, walls);
+    Way way = way_through(walls, w);
+#endif
     for (int axis = 0; axis < 3; ++axis) {
         ivec3 from = cell;
-        ivec3 to = cell;
         from[axis] += up[axis] ? -1 : 1;
-        to[axis] += up[axis] ? 1 : -1;
         if (share[axis] == 0.0) {
             continue;
         }
         if (local[axis] > 0) {
             float coverage = 0.0;
 #if HAS_LPV_WALLS
-            vec4 wall = lpv_walls[face_index(up[axis] ? cell : from, axis)];
-            coverage = wall.x;
-            if (coverage > 0.0) {
-                vec3 n = wall_normal(wall, axis) * (up[axis] ? 1.0 : -1.0);
-                behind -= share[axis] * coverage * step_share(w, n);
-            }
+            coverage = walls[2 * axis + (up[axis] ? 0 : 1)].x;
 #endif
             vec4 neighbour = imageLoad(lpv_radiance, volume_texel(from, ordinate));
 #if LPV_LIMITED
@@ -98,27 +84,17 @@ void main()
             // A straight way crosses |ω|₁/h faces per metre, half of it on either side of each.
             neighbour.rgb *= exp((here + texelFetch(lpv_air, volume_texel(from, 0), 0).rgb) * (-0.5 * grid_cell / whole));
 #endif
-            flux += (share[axis] * (1.0 - coverage) * min(neighbour.a, 1.0)) * neighbour.rgb;
+            flux += (share[axis] * (1.0 - coverage) * neighbour.a) * neighbour.rgb;
         }
-#if HAS_LPV_WALLS
-        if (local[axis] < grid_size[axis] - 1) {
-            vec4 wall = lpv_walls[face_index(up[axis] ? to : cell, axis)];
-            float coverage = wall.x;
-            if (coverage > 0.0) {
-                vec3 n = wall_normal(wall, axis) * (up[axis] ? -1.0 : 1.0);
-                ahead -= dot(w, n) >= 0.0 ? share[axis] * coverage : 0.0;
-                open_ahead -= share[axis] * coverage;
-            }
-        }
-#endif
     }
-    float section = min(behind, ahead);
-    // A cell whose every face is a wall that the light leaves, or none of them one it could come from, has no cross-section.
-    section = section > 1e-3 * whole ? section : whole;
-    float passed = open_ahead > section ? section / open_ahead : 1.0 + section - open_ahead;
-#if LPV_LIMITED
-    imageStore(lpv_carried, volume_texel(cell, ordinate), vec4(flux / section, passed));
+#if HAS_LPV_WALLS
+    vec4 result = vec4(flux / way.section, way.passed);
 #else
-    imageStore(lpv_radiance, volume_texel(cell, ordinate), vec4(flux / section, passed));
+    vec4 result = vec4(flux / whole, 1.0);
+#endif
+#if LPV_LIMITED
+    imageStore(lpv_carried, volume_texel(cell, ordinate), result);
+#else
+    imageStore(lpv_radiance, volume_texel(cell, ordinate), result);
 #endif
 }
