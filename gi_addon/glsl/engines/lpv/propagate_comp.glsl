@@ -8,16 +8,8 @@
 // L_a is the neighbour upwind along axis a, κ_a the covered share of the face between. Each term is a flux per solid angle, so
 // that without surfaces flux is conserved exactly; an isotropic field in a closed black cavity is exact too.
 //
-// Walls at an angle to the grid. Their steps are more area than the wall (|n|₁ times), and would take too much light. With n
-// turned to the cell's side, P = Σ max(ω_a n_a, 0) and M = Σ max(−ω_a n_a, 0) over the axes, a wall of area A has steps of
-// A P in the ordinate's back and of A M in its way, and sends A (P − M) of light where that is positive (ω·n ≥ 0). Then steps
-// in the way let nothing through and take nothing, and of those in the back the share M/P is no gap in what arrives, but air
-// between the steps. Where ω·n < 0 the steps in the back are all air. Neither counts as cross-section, so that the cell's
-// radiance is its flux over the rest:
-//     L = F/K,  F = Σ_a |ω_a| (1 − κ_a) L_a + Q/h²,  K = the smaller of Σ_behind and Σ_ahead of |ω_a| (1 − κ_a [as above]).
-// What goes on is L, or less where the open faces would pass more than F; the rest of F is absorbed. An isotropic field in
-// front of a wall of any direction then stays one. Alpha holds the share of L that goes on; above 1 all does, and alpha − 1 is
-// what is absorbed per L, so that a bounce has the very light that came to an end (reflect_comp.glsl).
+// Walls at an angle to the grid are corrected for their steps (transport_lib.glsl). Alpha holds what goes on through each open
+// face ahead, per L.
 //
 // Deviation from Kaplanyan and Dachsbacher: they send each cell's flux on as a cosine lobe about the face it passed, which
 // turns light by up to 90° per cell: measured in an empty room with one lit wall, the wall opposite gets 0.010 B from 8³ cells
@@ -62,16 +54,15 @@ void main()
 #endif
 #if HAS_LPV_WALLS
     vec4 walls[6];
-    cell_walls(cell, walls);
-    Way way = way_through(walls, w);
+    Way way = Way(whole, 1.0, 0.0);
+    if (cell_walls(cell, walls)) {
+        way = way_through(walls, w);
+    }
 #endif
     for (int axis = 0; axis < 3; ++axis) {
         ivec3 from = cell;
         from[axis] += up[axis] ? -1 : 1;
-        if (share[axis] == 0.0) {
-            continue;
-        }
-        if (local[axis] > 0) {
+        if (share[axis] > 0.0 && local[axis] > 0) {
             float coverage = 0.0;
 #if HAS_LPV_WALLS
             coverage = walls[2 * axis + (up[axis] ? 0 : 1)].x;
