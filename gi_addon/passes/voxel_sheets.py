@@ -2,8 +2,8 @@
 """How many sheets of surface a scene may have in a grid of voxels: a bound from its triangles, before anything is drawn.
 
 Memory for sheets is planned by it (passes/voxels.py). A triangle faces one of six sides most and adds at most one sheet to each
-cell that it meets. With w, h its extents across the axis that it faces, d the one along it, A the area of its shadow along the axis
-and S of those along the other two, all in cells:
+cell that it meets. With w, h its extents across the axis that it faces, d the one along it, A the area of its shadow along the
+axis and S of those along the other two, all in cells:
 
 - its shadow meets at most A + 2 (w + h) + 4 columns: whole squares are no more than its area, and an edge of a convex shape
   enters a new square only where it crosses a line, each line twice;

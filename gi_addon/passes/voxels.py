@@ -150,12 +150,12 @@ class Voxelisation(Pass):
     reads = (Optional("brdf.albedo"), Optional("brdf.average"), Optional("brdf.energy"))
     writes = (
         Texture("voxels.kinds", "voxel_kinds", "r: a bit for each kind of sheet in the cell or, in an empty one, 64 + level of "
-                "the largest empty block around it, over 255; g: mean opacity; b, a: sheets before the cell's in its row, low and "
-                "high byte", "rgba8", _size, mips=lambda f: voxel_grid(f).levels, scratch=True),
+                "the largest empty block around it, over 255; g: mean opacity; b, a: sheets before the cell's in its row, low "
+                "and high byte", "rgba8", _size, mips=lambda f: voxel_grid(f).levels, scratch=True),
         Texture("voxels.sheets", "voxel_sheets", "by sheet of the cells, packed: ½ + ½ slopes; ½ + ⅓ height over the cell's "
-                "middle, in cells, and a bit for each square that it covers; how far it reaches over the cell's face, down u and v "
-                "from its far sides, and up from its near ones; mean share of light that the cell's surfaces reflect, how much of it "
-                "is diffuse",
+                "middle, in cells, and a bit for each square that it covers; how far it reaches over the cell's face, down u and "
+                "v from its far sides, and up from its near ones; mean share of light that the cell's surfaces reflect, how much "
+                "of it is diffuse",
                 "rgba32ui", cell_sheets),
         Texture("voxels.emission", "voxel_emission", "by sheet: mean emitted radiance of its cell over the brightest emitter's",
                 "rgba16f", cell_sheets,
