@@ -204,6 +204,10 @@ class RadianceInjection(Pass):
         }  # fmt: skip
         emitters = planned.facts.emitters
         brightest = float(emitters.radiance.max()) if len(emitters) else 0.0
+        if planned.stale:
+            # Not all that there is memory for is in use.
+            for texture in planned.texture_writes():
+                frame.pool.framebuffer([frame.resources[texture.name]]).clear()
         again = planned.facts.settings.bounces - 1 if planned.has("vct.bounce") else 0
         for k in range(again + 1):
             if k:
