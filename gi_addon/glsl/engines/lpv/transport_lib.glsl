@@ -30,6 +30,26 @@
 
 #include "engines/lpv/geometry_lib.glsl"
 
+// g above, of light with `meeting` > `leaving` (M and P); `parts` is ω_a n_a.
+float step_share(float leaving, float meeting, vec3 parts, vec3 share)
+{
+    if (leaving <= 1e-4 * meeting) {
+        return 1.0;
+    }
+    float q = leaving / meeting;
+    float r = dot(share, vec3(greaterThan(parts, vec3(0.0)))) / dot(share, vec3(lessThan(parts, vec3(0.0))));
+    float n = q / r;
+    if (n > 1.0 && r < 1.0) {
+        return (1.0 - q) * (pow(1.0 + r, n) - 1.0) / (q * (1.0 - r));
+    }
+    if (n < 1.0 && r > 1.0) {
+        float m = 1.0 / n;
+        float s = (r - 1.0) * (1.0 - pow(r / (1.0 + r), m - 1.0));
+        return (m - r) * (m - s) / (m * (m - 1.0 - s));
+    }
+    return 1.0;
+}
+
 #if HAS_LPV_WALLS
 struct Way {
     float section; // K: flux over it is radiance
@@ -49,26 +69,6 @@ bool cell_walls(ivec3 cell, out vec4 walls[6])
         covered += walls[i].x;
     }
     return covered > 0.0;
-}
-
-// g above, of light with `meeting` > `leaving` (M and P); `parts` is ω_a n_a.
-float step_share(float leaving, float meeting, vec3 parts, vec3 share)
-{
-    if (leaving <= 1e-4 * meeting) {
-        return 1.0;
-    }
-    float q = leaving / meeting;
-    float r = dot(share, vec3(greaterThan(parts, vec3(0.0)))) / dot(share, vec3(lessThan(parts, vec3(0.0))));
-    float n = q / r;
-    if (n > 1.0 && r < 1.0) {
-        return (1.0 - q) * (pow(1.0 + r, n) - 1.0) / (q * (1.0 - r));
-    }
-    if (n < 1.0 && r > 1.0) {
-        float m = 1.0 / n;
-        float s = (r - 1.0) * (1.0 - pow(r / (1.0 + r), m - 1.0));
-        return (m - r) * (m - s) / (m * (m - 1.0 - s));
-    }
-    return 1.0;
 }
 
 Way way_through(vec4 walls[6], vec3 w)
