@@ -72,6 +72,9 @@ void ask_view(int index, vec3 p, vec3 n, float covered, inout Lit front, inout L
     vec4 light = vec4(0.0);
     if (on_sheet || beside) {
         light = vec4(t.flux / (t.area * PI), 1.0) * (on_sheet ? 1.0 : BESIDE_WEIGHT);
+        if (on_sheet) {
+            light.rgb *= abs(dot(normalize(ray), n)) / max(abs(facing) / length(ray), GRAZING_COS);
+        }
         // What a lamp lights in its own cell's reach leaves past the lamp: the slit above a ceiling lamp shares its cell
         // with the room, which sees the lamp.
         if (rsm_lights[v.light].kind == LIGHT_MESH && distance(p, from) < 1.733 * grid_cell) {
