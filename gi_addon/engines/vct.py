@@ -90,8 +90,8 @@ def _unlit(facts: Facts) -> str | None:
     return no_bounce(facts) or (None if facts.lit or facts.glowing_voxels else "no light shines")
 
 
-# The largest number that half floats hold, and how many sheets of a cell send light by their backs into one texel.
-_HALF_END, _SHEETS = 65504.0, 6
+# The largest number that half floats hold.
+_HALF_END = 65504.0
 
 
 def _irradiance_near(source: Source, distance: float) -> float:
@@ -123,7 +123,7 @@ def radiance_unit(facts: Facts) -> float:
         else:
             irradiance += float(brightest @ emitters.areas()) / near**2
     most = max((irradiance / np.pi + most) * max(facts.settings.bounces, 1), np.finfo("f4").tiny)
-    return float(2.0 ** np.ceil(np.log2(most * _SHEETS / _HALF_END)))
+    return float(2.0 ** np.ceil(np.log2(most / _HALF_END)))
 
 
 def _one_bounce(facts: Facts) -> str | None:
@@ -155,16 +155,11 @@ class RadianceInjection(Pass):
         Optional("rsm.depth"), Optional("rsm.albedo"), Optional("rsm.normal"), Optional("rsm.lights"), Optional("rsm.views"),
     )  # fmt: skip
     writes = (
-        Texture("vct.radiance", "voxel_radiance", "by side and axis: radiance × alpha, in units, that leaves the front of the "
-                "sheet; alpha, the share of the cell's face that it covers", "rgba16f", voxel_atlas,
+        Texture("vct.radiance", "voxel_radiance", "by side and axis: radiance × alpha, in units, that leaves the cell to that "
+                "side; alpha, the share of the cell's face that is covered", "rgba16f", voxel_atlas,
                 mips=lambda f: voxel_grid(f).levels, filter="linear", scratch=True),
-        Texture("vct.back", "voxel_back", "radiance × alpha, W/(m²·sr), that leaves sheets by their backs; alpha, the sum of "
-                "what they cover", "rgba16f", lambda f: voxel_grid(f).size, mips=lambda f: voxel_grid(f).levels,
-                filter="linear", scratch=True),
         Texture("vct.bounce", "voxel_bounce", "by side and axis: radiance of the later bounces, W/(m²·sr)", "rgba16f",
                 voxel_atlas, when=_one_bounce, scratch=True),
-        Texture("vct.bounce_back", "voxel_bounce_back", "the same by the surfaces' backs", "rgba16f",
-                lambda f: voxel_grid(f).size, when=_one_bounce, scratch=True),
     )  # fmt: skip
     uniforms = (
         *_LIGHT_UNIFORMS,
@@ -204,7 +199,6 @@ class RadianceInjection(Pass):
             if k:
                 self._bounce(frame, planned, grid, values)
                 frame.resources["vct.bounce"].use(12)
-                frame.resources["vct.bounce_back"].use(13)
             frame.set(program, add_bounce=int(k > 0), emission_scale=brightest / values["radiance_unit"], **values)
             set_medium(frame, program, planned.facts)
             frame.compute(planned, program, grid.size, (4, 4, 4))
@@ -215,7 +209,6 @@ class RadianceInjection(Pass):
         """Gather what the voxels hold into vct.bounce."""
         program = frame.program(planned, "bounce")
         frame.resources["vct.radiance"].use(12)
-        frame.resources["vct.back"].use(13)
         frame.set(program, **values)
         frame.compute(planned, program, grid.size, (4, 4, 4))
 
@@ -226,16 +219,15 @@ def build_mips(frame: Frame, planned: Planned, grid: VoxelGrid) -> None:
     size = grid.size
     for level in range(grid.levels):
         size = tuple(n // 2 for n in size)
-        for k, name in enumerate(("vct.radiance", "vct.back")):
-            frame.resources[name].bind_to_image(4 + 2 * k, read=True, write=False, level=level)
-            frame.resources[name].bind_to_image(5 + 2 * k, read=False, write=True, level=level + 1)
+        frame.resources["vct.radiance"].bind_to_image(4, read=True, write=False, level=level)
+        frame.resources["vct.radiance"].bind_to_image(5, read=False, write=True, level=level + 1)
         frame.set(program, coarse_size=size, coarse_level=level + 1, first_time=int(planned.stale))
         program.run(*(-(-n // 4) for n in size))
         frame.gl.ctx.memory_barrier()
 
 
 # What cones read.
-_VOLUMES = ("vct.radiance", "vct.back", "voxels.sheets", "voxels.extents", "voxels.kinds")
+_VOLUMES = ("vct.radiance", "voxels.sheets", "voxels.extents", "voxels.kinds")
 _CONE_UNIFORMS = (
     *_LIGHT_UNIFORMS,
     Uniform("cone_count", "int", "cones per point and sub-frame"),

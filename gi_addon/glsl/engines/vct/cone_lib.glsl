@@ -145,13 +145,13 @@ Meeting first_sheet(sampler3D sheets, sampler3D extents, Cone cone, ivec3 cell, 
 
 // Light that leaves a sheet towards the cone, over the cone's footprint there: filtered across the sheet, but not along its axis,
 // where other surfaces face the same way before and behind it.
-vec3 leaving_light(sampler3D atlas, sampler3D back, Grid grid, Cone cone, Meeting met)
+vec3 leaving_light(sampler3D atlas, Grid grid, Cone cone, Meeting met)
 {
     float lod = clamp(floor(log2(max(cone.spread * met.t, 1.0))), 0.0, grid.levels);
     vec3 p = cone.start + cone.direction * met.t;
     vec3 layer = (floor(vec3(met.cell) * exp2(-lod)) + 0.5) * exp2(lod);
     vec3 uvw = mix(p, layer, equal(ivec3(met.part >> 1), ivec3(0, 1, 2))) / grid.size;
-    vec4 light = met.front ? part_at(atlas, grid, uvw, lod, met.part) : textureLod(back, uvw, lod);
+    vec4 light = part_at(atlas, grid, uvw, lod, met.front ? met.part : met.part ^ 1);
     return light.a > 0.0 ? light.rgb * (radiance_unit / light.a) : vec3(0.0);
 }
 
@@ -183,7 +183,7 @@ Meeting next_sheet(sampler3D sheets, sampler3D extents, sampler3D kinds, Grid gr
     return met;
 }
 
-ConeResult trace_cone(sampler3D atlas, sampler3D back, sampler3D sheets, sampler3D extents, sampler3D kinds, Grid grid, Cone cone)
+ConeResult trace_cone(sampler3D atlas, sampler3D sheets, sampler3D extents, sampler3D kinds, Grid grid, Cone cone)
 {
     ConeResult result = ConeResult(vec3(0.0), 1.0, NOTHING_MET);
     float end = cone_end(cone, grid);
@@ -194,7 +194,7 @@ ConeResult trace_cone(sampler3D atlas, sampler3D back, sampler3D sheets, sampler
         }
         Meeting met = next_sheet(sheets, extents, kinds, grid, cone, end, t);
         if (met.t < end) {
-            result.radiance += result.transmittance * met.opacity * leaving_light(atlas, back, grid, cone, met);
+            result.radiance += result.transmittance * met.opacity * leaving_light(atlas, grid, cone, met);
             result.transmittance *= 1.0 - met.opacity;
             result.first = layer == 0 ? met : result.first;
         }

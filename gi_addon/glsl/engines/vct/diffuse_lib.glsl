@@ -52,7 +52,7 @@ Gathered gather_cones(ivec2 place, vec3 position_ws, vec3 n, vec3 ng)
         if (dot(cone.direction, ng) <= 0.0) {
             continue; // into the triangle
         }
-        ConeResult result = trace_cone(voxel_radiance, voxel_back, voxel_sheets, voxel_extents, voxel_kinds, grid, cone);
+        ConeResult result = trace_cone(voxel_radiance, voxel_sheets, voxel_extents, voxel_kinds, grid, cone);
         g.radiance += result.radiance / float(cone_count);
         g.direction += directional(cone.direction, n, result.radiance);
     }

@@ -17,7 +17,6 @@ layout(local_size_x = 4, local_size_y = 4, local_size_z = 4) in;
 
 #if HAS_VOXEL_BOUNCE
 layout(binding = 12) uniform sampler3D bounce_now;
-layout(binding = 13) uniform sampler3D bounce_back_now;
 #endif
 
 #if HAS_RSM_DEPTH
@@ -63,8 +62,8 @@ void ask_view(int index, vec3 p, vec3 n, float covered, inout Lit front, inout L
     bool on_front = dot(ray, n) < 0.0;
     vec3 out_of = on_front ? n : -n;
     bool through = facing > 0.0;
-    bool on_sheet = abs(dot(hit - p, n)) <= ON_SHEET * grid_cell && dot(through ? -t.normal_ws : t.normal_ws, out_of) > FACING;
-    bool beside = !on_sheet && dot(hit - p, hit - p) <= t.area;
+    bool on_sheet = dot(hit - p, hit - p) <= sqr(grid_cell * 1.0) && abs(dot(hit - p, n)) <= ON_SHEET * grid_cell && dot(through ? -t.normal_ws : t.normal_ws, out_of) > FACING;
+    bool beside = false;
     bool before = dot(hit - p, ray) < 0.0;
     if (!on_sheet && !beside && !before) {
         return;
@@ -130,20 +129,28 @@ void main()
     emission = texelFetch(voxel_emission, cell, 0).rgb * emission_scale; // by both sides of a surface
 #endif
     vec3 center = grid_low + (vec3(cell) + 0.5) * grid_cell;
-    vec4 backs = vec4(0.0);
-    for (int part = 0; part < 6; ++part) {
-        vec4 fronts = vec4(0.0);
-        if (!empty && (kinds >> part & 1u) == 1u) {
+    for (int axis = 0; axis < 3; ++axis) {
+        Sheet sheets[2];
+        vec3 front[2];
+        vec3 back[2];
+        bool any_sheet = false;
+        for (int side = 0; side < 2; ++side) {
+            int part = 2 * axis + side;
+            front[side] = back[side] = emission;
+            sheets[side] = Sheet(vec3(0.0), 0.0, 0u);
+            if (empty || (kinds >> part & 1u) == 0u) {
+                continue;
+            }
+            any_sheet = true;
             Sheet sheet = sheet_at(voxel_sheets, cell, grid_size, part);
-            vec3 front = emission;
-            vec3 back = emission;
+            sheets[side] = sheet;
 #if HAS_RSM_DEPTH
             float covered = 0.0;
 #if HAS_VOXEL_LAMPS
-            covered = texelFetch(voxel_lamps, cell, 0)[part >> 1];
-            ivec3 before = cell + ivec3(axis_vector(part >> 1)) * ((part & 1) == 0 ? 1 : -1);
+            covered = texelFetch(voxel_lamps, cell, 0)[axis];
+            ivec3 before = cell + ivec3(axis_vector(axis)) * (side == 0 ? 1 : -1);
             if (all(greaterThanEqual(before, ivec3(0))) && all(lessThan(before, grid_size))) {
-                covered = max(covered, texelFetch(voxel_lamps, before, 0)[part >> 1]);
+                covered = max(covered, texelFetch(voxel_lamps, before, 0)[axis]);
             }
 #endif
             vec3 n = sheet_normal(sheet, part);
@@ -159,25 +166,23 @@ void main()
                 }
                 bool last = index + 1 == view_count || rsm_views[index + 1].light != rsm_views[index].light;
                 if (last) {
-                    front += leaving_mean(lit_front, lit_back);
-                    back += leaving_mean(lit_back, lit_front);
+                    front[side] += leaving_mean(lit_front, lit_back);
+                    back[side] += leaving_mean(lit_back, lit_front);
                     lit_front = lit_back = UNLIT;
                 }
             }
 #endif
+        }
+        for (int side = 0; side < (any_sheet || first_time == 1 ? 2 : 0); ++side) {
+            int part = 2 * axis + side;
+            vec2 shown = shown_shares(sheets[side], sheets[1 - side], part);
+            vec4 light = vec4(front[side] * shown.x + back[1 - side] * shown.y, shown.x + shown.y);
 #if HAS_VOXEL_BOUNCE
             if (add_bounce == 1) {
-                front += texelFetch(bounce_now, part_texel(cell, grid_size, part >> 1, part & 1), 0).rgb;
-                back += texelFetch(bounce_back_now, cell, 0).rgb;
+                light.rgb += texelFetch(bounce_now, part_texel(cell, grid_size, axis, side), 0).rgb * light.a;
             }
 #endif
-            float share = squares_share(sheet.squares);
-            fronts = vec4(front, 1.0) * share;
-            backs += vec4(back, 1.0) * share;
-        }
-        if (fronts.a > 0.0 || first_time == 1) {
-            imageStore(voxel_radiance, part_texel(cell, grid_size, part >> 1, part & 1), clamp(fronts, -HALF_END, HALF_END));
+            imageStore(voxel_radiance, part_texel(cell, grid_size, axis, side), clamp(light, -HALF_END, HALF_END));
         }
     }
-    imageStore(voxel_back, cell, clamp(backs, -HALF_END, HALF_END));
 }

@@ -6,8 +6,6 @@
 layout(local_size_x = 4, local_size_y = 4, local_size_z = 4) in;
 layout(binding = 4, rgba16f) readonly uniform image3D finer;
 layout(binding = 5, rgba16f) writeonly uniform image3D coarser;
-layout(binding = 6, rgba16f) readonly uniform image3D finer_back;
-layout(binding = 7, rgba16f) writeonly uniform image3D coarser_back;
 uniform ivec3 coarse_size;
 uniform int coarse_level;
 
@@ -33,7 +31,7 @@ void main()
         ivec3 front = 2 * cell + along * (1 - side);
         ivec3 behind = 2 * cell + along * side;
         vec4 light = vec4(0.0);
-        bool there = (kinds >> part & 1u) == 1u;
+        bool there = (kinds >> part & 1u) == 1u || (kinds >> (part ^ 1) & 1u) == 1u;
         if (!there && first_time == 0) {
             continue;
         }
@@ -46,9 +44,4 @@ void main()
         }
         imageStore(coarser, part_texel(cell, coarse_size, axis, side), light);
     }
-    vec4 back = vec4(0.0);
-    for (int k = 0; k < (kinds == 0u ? 0 : 8); ++k) {
-        back += imageLoad(finer_back, 2 * cell + ivec3(k & 1, (k >> 1) & 1, k >> 2));
-    }
-    imageStore(coarser_back, cell, 0.125 * back);
 }

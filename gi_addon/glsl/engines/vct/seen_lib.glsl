@@ -9,7 +9,7 @@ const int SEEN_CONES = 2;
 // arrives at surfaces by one bounce less.
 ConeResult trace_seen(Grid grid, Cone cone)
 {
-    ConeResult seen = trace_cone(voxel_radiance, voxel_back, voxel_sheets, voxel_extents, voxel_kinds, grid, cone);
+    ConeResult seen = trace_cone(voxel_radiance, voxel_sheets, voxel_extents, voxel_kinds, grid, cone);
     Meeting met = seen.first;
     if (met.opacity > 0.0) {
         mat3 frame = frame_from_normal(met.normal);
@@ -20,7 +20,7 @@ ConeResult trace_seen(Grid grid, Cone cone)
         vec4 albedo = texelFetch(voxel_albedo, met.cell, 0);
         for (int i = 0; i < SEEN_CONES; ++i) {
             Cone next = Cone(start, frame * cone_direction(run + uint(i)), spread, 1e30, met.front ? 1.0 : -1.0);
-            gathered += trace_cone(voxel_radiance, voxel_back, voxel_sheets, voxel_extents, voxel_kinds, grid, next).radiance;
+            gathered += trace_cone(voxel_radiance, voxel_sheets, voxel_extents, voxel_kinds, grid, next).radiance;
         }
         seen.radiance += albedo.rgb * albedo.a * gathered * (met.opacity / float(SEEN_CONES));
     }

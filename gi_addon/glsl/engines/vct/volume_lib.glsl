@@ -4,9 +4,10 @@
 // x_k + slope · (u, v) = height about the cell's middle, along axis k with u and v the next axes round, and which of 4 × 4
 // squares of the face it covers.
 //
-// Light is kept in an atlas of six parts, sheets' sides +x … −z; part (side, axis) lies at (side, 0, axis) of 2 × 1 × 3.
-// Alpha is the share of the face that the sheet covers, rgb radiance × alpha, in units of `radiance_unit`. Light that leaves sheets by their backs (a sheet
-// without thickness, lit from behind) is in a volume of its own.
+// Light is kept in an atlas of six parts, what the cell shows to the sides +x … −z; part (side, axis) lies at (side, 0, axis) of
+// 2 × 1 × 3. Alpha is the share of the face that is covered, rgb radiance × alpha, in units of `radiance_unit`. To a side show the
+// front of the sheet that faces it and the back of the one that faces away, where that is the nearer of them: of a wall thinner
+// than a cell the fronts, of a sheet without thickness its front and its back.
 
 #include "lib/math_lib.glsl"
 
@@ -57,6 +58,24 @@ vec3 sheet_point(Sheet sheet, int part, vec2 uv)
 vec2 square_middle(int square) { return (vec2(square & 3, square >> 2) + 0.5) * 0.25 - 0.5; }
 
 float squares_share(uint squares) { return float(bitCount(squares)) / 16.0; }
+
+// Shares of the cell's face that show, to the side of part `part`, the front of that part's sheet and the back of the opposite
+// part's. Sheets that are not there have no squares.
+vec2 shown_shares(Sheet front, Sheet opposite, int part)
+{
+    int axis = part >> 1;
+    float sign_ = (part & 1) == 0 ? 1.0 : -1.0;
+    ivec2 count = ivec2(0);
+    for (int square = 0; square < 16; ++square) {
+        vec2 uv = square_middle(square);
+        float ahead = sign_ * (sheet_point(front, part, uv)[axis] - sheet_point(opposite, part, uv)[axis]);
+        bool has_front = (front.squares >> square & 1u) == 1u;
+        bool has_back = (opposite.squares >> square & 1u) == 1u;
+        bool front_shows = has_front && (!has_back || ahead >= 0.0);
+        count += ivec2(front_shows, has_back && !front_shows);
+    }
+    return vec2(count) / 16.0;
+}
 
 // Kinds of sheets in a cell: 1 … 63 a bit each, or 64 + level of the largest empty block.
 uint kinds_of(vec4 texel) { return uint(texel.r * 255.0 + 0.5); }
