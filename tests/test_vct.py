@@ -62,6 +62,81 @@ def volume(scene, name: str, level: int = 0, **settings) -> tuple[VoxelGrid, np.
     return shared().call(job)
 
 
+def to_side(grid: VoxelGrid, atlas: np.ndarray, axis: int, side: int) -> np.ndarray:
+    """Of the atlas ``vct.radiance``: what cells send to one side (0 towards +), (z, y, x, 4), radiance × share and share."""
+    x, _, z = grid.size
+    return atlas[axis * z : (axis + 1) * z, :, side * x : (side + 1) * x]
+
+
+# --- what light is on a sheet -----------------------------------------------------------------------------------------
+
+
+def test_a_low_step_throws_its_whole_shadow(gl):
+    """Sun at cosine .1 over a step of ⅖ of a cell: four cells of the lower floor are dark, though the lit edge is near to its
+    plane. Told by that nearness alone they shone as the step does."""
+    b = scenes.SceneBuilder("step")
+    step = 0.4 * 4.0 / 31.0
+    white = scenes.diffuse((0.8,) * 3)
+    upper = np.array([[[-2, -2, 0], [0, -2, 0], [0, 2, 0], [-2, 2, 0]]], "f8")
+    lower = np.array([[[0, -2, -step], [2, -2, -step], [2, 2, -step], [0, 2, -step]]], "f8")
+    riser = np.array([[[0, -2, -step], [0, 2, -step], [0, 2, 0], [0, -2, 0]]], "f8")
+    b.quads(np.concatenate([upper, lower, riser]), white)
+    b.light(scenes.sun_light((1.0, 0.0, -0.1), 10.0))
+    scene = b.build(scenes.perspective((0, -4, 3), (0, 0, 0), 0.9))
+    grid, atlas = volume(scene, "vct.radiance", vct__resolution=32)
+    up = to_side(grid, atlas, 2, 0)
+    column = up[..., 0].sum((0, 1)) / np.maximum(up[..., 3].sum((0, 1)), 1e-9)
+    first = (0.0 - grid.low[0]) / grid.cell
+    lit = column[int(first) - 6 : int(first) - 2].mean()
+    assert column[int(first) + 1 : int(first) + 4].max() < 0.05 * lit
+    np.testing.assert_allclose(column[int(first) + 6 : int(first) + 10], lit, rtol=0.05)
+
+
+def test_a_corrugated_floor_sends_what_arrives(gl):
+    """Ridges of 35° and half a cell wide, sun at 80°: the lit facets are four times as bright as a flat floor, and half of the
+    surface is dark. Together they reflect what a flat floor does."""
+    white = scenes.diffuse((0.8,) * 3)
+    sent = []
+    for height in (0.0, 0.7):
+        b = scenes.SceneBuilder("corrugated")
+        width = 4.0 / 63.0 / 2.0
+        x = np.arange(-2.0, 2.0 - width / 2, width)
+        rise = height * width / 2.0
+        low, top, next_ = x, x + width / 2, x + width
+        facets = [
+            np.stack([np.stack([p, -2 + 0 * x, a + 0 * x], -1), np.stack([q, -2 + 0 * x, c + 0 * x], -1),
+                      np.stack([q, 2 + 0 * x, c + 0 * x], -1), np.stack([p, 2 + 0 * x, a + 0 * x], -1)], 1)
+            for p, q, a, c in ((low, top, 0.0, rise), (top, next_, rise, 0.0))
+        ]  # fmt: skip
+        b.quads(np.concatenate(facets), white)
+        b.light(scenes.sun_light((1.0, 0.0, -np.tan(np.radians(10.0))), 10.0))
+        scene = b.build(scenes.perspective((0, -4, 3), (0, 0, 0), 0.9))
+        grid, atlas = volume(scene, "vct.radiance", vct__resolution=32, rsm__resolution=2048)
+        seen, through = 0.0, 1.0
+        for layer in to_side(grid, atlas, 2, 0)[::-1]:  # from above
+            seen, through = seen + through * layer[..., 0], through * (1.0 - layer[..., 3])
+        sent.append(seen[4:-4, 4:-4].mean())
+    assert sent[1] == pytest.approx(sent[0], rel=0.15)
+
+
+@pytest.mark.parametrize("up", [False, True])
+def test_a_floor_beside_a_lit_outer_wall_is_dark_whichever_way_it_faces(gl, up):
+    """A room without thickness, sunlit from outside. Cells where the floor meets the wall hold the wall's bright outer side too:
+    it leaves to that side alone, not upwards."""
+    b = scenes.SceneBuilder("room")
+    box = scenes.box_quads((-1, -1, 0), (1, 1, 2), inward=True)
+    floor = np.abs(box[..., 2]).max(axis=1) < 1e-9
+    box[floor] = box[floor][:, :: 1 if up else -1]
+    b.quads(box, scenes.diffuse((0.8,) * 3))
+    b.light(scenes.sun_light((-1.0, 0.0, -0.2), 10.0))
+    scene = b.build(scenes.perspective((0, -0.9, 1), (0, 0, 0.8), 1.2))
+    grid, atlas = volume(scene, "vct.radiance", vct__resolution=32)
+    outwards = to_side(grid, atlas, 0, 0)[..., 0].max()
+    z = int((0.0 - grid.low[2]) / grid.cell)
+    assert outwards > 0.0
+    assert to_side(grid, atlas, 2, 0)[z, :, :, 0].max() < 1e-3 * outwards
+
+
 # --- energy -----------------------------------------------------------------------------------------------------------
 
 
