@@ -15,10 +15,11 @@
 #include "engines/rsm/rsm_lib.glsl"
 #endif
 
-layout(local_size_x = 4, local_size_y = 4, local_size_z = 4) in;
+layout(local_size_x = 64) in;
 
 #if HAS_VOXEL_BOUNCE
-layout(binding = 12) uniform sampler3D bounce_now;
+layout(binding = 12) uniform sampler2D bounce_now;
+layout(binding = 13) uniform sampler2D bounce_back_now;
 #endif
 
 #if HAS_RSM_DEPTH
@@ -107,48 +108,53 @@ bool outside_view(LightView v, vec3 center)
 }
 #endif
 
+#if HAS_VOXEL_LAMPS
+// The share of a cell's face along `axis` that lamps cover. A lamp with two sides covers what one of them does.
+float lamps_cover(ivec3 cell, int axis)
+{
+    vec4 texel = texelFetch(voxel_kinds, cell, 0);
+    uint kinds = kinds_of(texel);
+    float covered = 0.0;
+    for (int part = 2 * axis; part < 2 * axis + 2; ++part) {
+        if (kinds < 64u && (kinds >> part & 1u) == 1u) {
+            uint number = first_number(voxel_rows, texel, cell, grid_size, 0) + sheets_before(kinds, part);
+            covered = max(covered, texelFetch(voxel_lamps, store_texel(number), 0).r);
+        }
+    }
+    return covered;
+}
+#endif
+
 // Where half floats end. The unit keeps light below (engines/vct.py: radiance_unit) but for what lies nearer to a lamp than a
 // quarter of a cell: that is as bright as what lies there.
 const float HALF_END = 65504.0;
 
 void main()
 {
-    ivec3 cell = ivec3(gl_GlobalInvocationID);
-    if (any(greaterThanEqual(cell, grid_size))) {
+    uint number = invoked_number();
+    ivec3 cell;
+    uint kinds;
+    if (!first_of_cell(voxel_places, voxel_rows, voxel_kinds, grid_size, 0, number, cell, kinds)) {
         return;
-    }
-    uint kinds = kinds_of(texelFetch(voxel_kinds, cell, 0));
-    bool empty = kinds >= 64u;
-    if (empty && first_time == 0) {
-        return; // as it was
     }
     vec3 emission = vec3(0.0);
 #if HAS_VOXEL_EMISSION
-    emission = texelFetch(voxel_emission, cell, 0).rgb * emission_scale; // by both sides of a surface
+    emission = texelFetch(voxel_emission, store_texel(number), 0).rgb * emission_scale; // by both sides of a surface
 #endif
     vec3 center = grid_low + (vec3(cell) + 0.5) * grid_cell;
-    for (int axis = 0; axis < 3; ++axis) {
-        Sheet sheets[2];
-        vec3 front[2];
-        vec3 back[2];
-        bool any_sheet = false;
-        for (int side = 0; side < 2; ++side) {
-            int part = 2 * axis + side;
-            front[side] = back[side] = emission;
-            sheets[side] = Sheet(vec3(0.0), 0.0, 0u);
-            if (empty || (kinds >> part & 1u) == 0u) {
-                continue;
-            }
-            any_sheet = true;
-            Sheet sheet = sheet_at(voxel_sheets, cell, grid_size, part);
-            sheets[side] = sheet;
+    uint own = number;
+    for (int part = 0; part < 6; ++part) {
+        if ((kinds >> part & 1u) == 1u) {
+            Sheet sheet = sheet_at(voxel_sheets, own, part);
+            vec3 front = emission;
+            vec3 back = emission;
 #if HAS_RSM_DEPTH
             float covered = 0.0;
 #if HAS_VOXEL_LAMPS
-            covered = texelFetch(voxel_lamps, cell, 0)[axis];
-            ivec3 before = cell + ivec3(axis_vector(axis)) * (side == 0 ? 1 : -1);
+            covered = lamps_cover(cell, part >> 1);
+            ivec3 before = cell + ivec3(axis_vector(part >> 1)) * ((part & 1) == 0 ? 1 : -1);
             if (all(greaterThanEqual(before, ivec3(0))) && all(lessThan(before, grid_size))) {
-                covered = max(covered, texelFetch(voxel_lamps, before, 0)[axis]);
+                covered = max(covered, lamps_cover(before, part >> 1));
             }
 #endif
             vec3 n = sheet_normal(sheet, part);
@@ -164,23 +170,22 @@ void main()
                 }
                 bool last = index + 1 == view_count || rsm_views[index + 1].light != rsm_views[index].light;
                 if (last) {
-                    front[side] += leaving_mean(lit_front, lit_back);
-                    back[side] += leaving_mean(lit_back, lit_front);
+                    front += leaving_mean(lit_front, lit_back);
+                    back += leaving_mean(lit_back, lit_front);
                     lit_front = lit_back = UNLIT;
                 }
             }
 #endif
-        }
-        for (int side = 0; side < (any_sheet || first_time == 1 ? 2 : 0); ++side) {
-            int part = 2 * axis + side;
-            vec2 shown = shown_shares(sheets[side], sheets[1 - side], part);
-            vec4 light = vec4(front[side] * shown.x + back[1 - side] * shown.y, shown.x + shown.y);
 #if HAS_VOXEL_BOUNCE
             if (add_bounce == 1) {
-                light.rgb += texelFetch(bounce_now, part_texel(cell, grid_size, axis, side), 0).rgb * light.a;
+                front += texelFetch(bounce_now, store_texel(own), 0).rgb;
+                back += texelFetch(bounce_back_now, store_texel(own), 0).rgb;
             }
 #endif
-            imageStore(voxel_radiance, part_texel(cell, grid_size, axis, side), clamp(light, -HALF_END, HALF_END));
+            float share = squares_share(sheet.squares);
+            imageStore(voxel_radiance, store_texel(own), clamp(vec4(front, 1.0) * share, -HALF_END, HALF_END));
+            imageStore(voxel_back, store_texel(own), clamp(vec4(back, 1.0) * share, -HALF_END, HALF_END));
+            ++own;
         }
     }
 }
