@@ -166,7 +166,8 @@ class RadianceInjection(Pass):
     writes = (
         Texture("vct.radiance", "voxel_radiance", "by sheet: radiance × alpha, in units, that leaves its front; alpha, the share "
                 "of the cell's face that it covers", "rgba16f", all_sheets, access="readwrite", scratch=True),
-        Texture("vct.back", "voxel_back", "the same that leaves its back", "rgba16f", all_sheets, access="readwrite", scratch=True),
+        Texture("vct.back", "voxel_back", "the same that leaves its back", "rgba16f", all_sheets, access="readwrite",
+                scratch=True),
         Texture("vct.bounce", "voxel_bounce", "by sheet of the cells: radiance of the later bounces, in units", "rgba16f",
                 cell_sheets, when=_one_bounce, scratch=True),
         Texture("vct.bounce_back", "voxel_bounce_back", "the same by its back", "rgba16f", cell_sheets, when=_one_bounce,
