@@ -16,9 +16,8 @@ void main()
     }
 #if HAS_LPV_ABSORBED
     vec3 absorbed = batch_first == 0 ? vec3(0.0) : imageLoad(lpv_absorbed, volume_texel(cell, 0)).rgb;
-    vec4 walls[6];
     // A rim's light goes on whole (rim_comp.glsl), and ends in the grid around.
-    bool absorbs = cell_walls(cell, walls) && !in_rim(cell, grid_size, grid_rim);
+    bool absorbs = walled(cell) && !in_rim(cell, grid_size, grid_rim);
 #endif
     for (int i = 0; i < batch_count; ++i) {
         vec4 carried = imageLoad(lpv_radiance, volume_texel(cell, i));
@@ -31,7 +30,8 @@ void main()
         }
 #if HAS_LPV_ABSORBED
         if (absorbs) {
-            absorbed += value * (ordinate.w * way_through(walls, ordinate.xyz).taken);
+            vec3 covered;
+            absorbed += value * (ordinate.w * way_through(cell, ordinate.xyz, covered).taken);
         }
 #endif
     }

@@ -53,20 +53,16 @@ void main()
     vec3 here = texelFetch(lpv_air, volume_texel(cell, 0), 0).rgb;
 #endif
 #if HAS_LPV_WALLS
-    vec4 walls[6];
+    vec3 covered;
+    Way way = way_through(cell, w, covered);
+#else
+    vec3 covered = vec3(0.0);
     Way way = Way(whole, 1.0, 0.0);
-    if (cell_walls(cell, walls)) {
-        way = way_through(walls, w);
-    }
 #endif
     for (int axis = 0; axis < 3; ++axis) {
         ivec3 from = cell;
         from[axis] += up[axis] ? -1 : 1;
         if (share[axis] > 0.0 && local[axis] > 0) {
-            float coverage = 0.0;
-#if HAS_LPV_WALLS
-            coverage = walls[2 * axis + (up[axis] ? 0 : 1)].x;
-#endif
             vec4 neighbour = imageLoad(lpv_radiance, volume_texel(from, ordinate));
 #if LPV_LIMITED
             neighbour.rgb *= float(wave > 0); // before the first iteration a cell has only what it emits
@@ -75,14 +71,10 @@ void main()
             // A straight way crosses |ω|₁/h faces per metre, half of it on either side of each.
             neighbour.rgb *= exp((here + texelFetch(lpv_air, volume_texel(from, 0), 0).rgb) * (-0.5 * grid_cell / whole));
 #endif
-            flux += (share[axis] * (1.0 - coverage) * neighbour.a) * neighbour.rgb;
+            flux += (share[axis] * (1.0 - covered[axis]) * neighbour.a) * neighbour.rgb;
         }
     }
-#if HAS_LPV_WALLS
     vec4 result = vec4(flux / way.section, way.passed);
-#else
-    vec4 result = vec4(flux / whole, 1.0);
-#endif
 #if LPV_LIMITED
     imageStore(lpv_carried, volume_texel(cell, ordinate), result);
 #else

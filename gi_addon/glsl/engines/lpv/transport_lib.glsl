@@ -50,63 +50,81 @@ float step_share(float leaving, float meeting, vec3 parts, vec3 share)
     return 1.0;
 }
 
-#if HAS_LPV_WALLS
 struct Way {
     float section; // K: flux over it is radiance
     float passed;  // what each open face ahead passes on, per radiance
     float taken;   // what the walls take, per radiance
 };
 
-// The walls around a cell, low and high side of each axis; at the grid's border is none. Whether there are any.
-bool cell_walls(ivec3 cell, out vec4 walls[6])
+#if HAS_LPV_WALLS
+// Whether any wall stands at a cell's faces.
+bool walled(ivec3 cell)
 {
     float covered = 0.0;
-    for (int i = 0; i < 6; ++i) {
-        ivec3 upper = cell;
-        upper[i >> 1] += i & 1;
-        bool there = upper[i >> 1] > 0 && upper[i >> 1] < grid_size[i >> 1];
-        walls[i] = there ? lpv_walls[face_index(upper, i >> 1)] : vec4(0.0);
-        covered += walls[i].x;
+    for (int axis = 0; axis < 3; ++axis) {
+        ivec3 next = cell;
+        next[axis] += 1;
+        covered += cell[axis] > 0 ? lpv_walls[face_index(cell, axis)].x : 0.0;
+        covered += next[axis] < grid_size[axis] ? lpv_walls[face_index(next, axis)].x : 0.0;
     }
     return covered > 0.0;
 }
 
-Way way_through(vec4 walls[6], vec3 w)
+// Σ |ω_a| over the faces behind and ahead that are cross-section, over the open ones ahead; over those in the way, and of that what
+// they take.
+struct Faces {
+    float behind;
+    float ahead;
+    float open_ahead;
+    float in_way;
+    float taking;
+};
+
+// Add a wall across `axis` that blocks the share `blocked` of |ω|₁, on the cell's high or low side.
+void add_wall(inout Faces faces, vec4 wall, int axis, bool high, float blocked, vec3 w)
+{
+    vec3 parts = w * wall_normal(wall, axis) * (high ? -1.0 : 1.0);
+    float leaving = dot(max(parts, vec3(0.0)), vec3(1.0));
+    float meeting = -dot(min(parts, vec3(0.0)), vec3(1.0));
+    if ((w[axis] >= 0.0) != high) {
+        faces.behind -= blocked * (leaving > 1e-6 ? min(meeting / leaving, 1.0) : 1.0);
+        return;
+    }
+    faces.open_ahead -= blocked;
+    faces.in_way += blocked;
+    faces.ahead -= leaving >= meeting ? blocked : 0.0;
+    faces.taking += blocked * (leaving >= meeting ? 1.0 : step_share(leaving, meeting, parts, abs(w)));
+}
+
+// The way of light along w through a cell; `covered` is how much of each axis' face in the back walls cover.
+Way way_through(ivec3 cell, vec3 w, out vec3 covered)
 {
     vec3 share = abs(w);
     float whole = share.x + share.y + share.z;
-    float behind = whole;
-    float ahead = whole;
-    float open_ahead = whole;
-    float in_way = 0.0;
-    float taking = 0.0;
-    for (int i = 0; i < 6; ++i) {
-        int axis = i >> 1;
-        bool high = (i & 1) == 1;
-        float blocked = share[axis] * walls[i].x;
-        if (blocked <= 0.0) {
-            continue;
+    Faces faces = Faces(whole, whole, whole, 0.0, 0.0);
+    covered = vec3(0.0);
+    for (int axis = 0; axis < 3; ++axis) {
+        bool up = w[axis] >= 0.0;
+        ivec3 next = cell;
+        next[axis] += 1;
+        vec4 low = cell[axis] > 0 ? lpv_walls[face_index(cell, axis)] : vec4(0.0);
+        vec4 high = next[axis] < grid_size[axis] ? lpv_walls[face_index(next, axis)] : vec4(0.0);
+        covered[axis] = up ? low.x : high.x;
+        if (low.x > 0.0) {
+            add_wall(faces, low, axis, false, share[axis] * low.x, w);
         }
-        vec3 parts = w * wall_normal(walls[i], axis) * (high ? -1.0 : 1.0);
-        float leaving = dot(max(parts, vec3(0.0)), vec3(1.0));
-        float meeting = -dot(min(parts, vec3(0.0)), vec3(1.0));
-        if ((w[axis] >= 0.0) != high) { // in the back
-            behind -= blocked * (leaving > 1e-6 ? min(meeting / leaving, 1.0) : 1.0);
-        } else {
-            open_ahead -= blocked;
-            ahead -= leaving >= meeting ? blocked : 0.0;
-            in_way += blocked;
-            taking += blocked * (leaving >= meeting ? 1.0 : step_share(leaving, meeting, parts, share));
+        if (high.x > 0.0) {
+            add_wall(faces, high, axis, true, share[axis] * high.x, w);
         }
     }
     Way way;
-    way.section = min(behind, ahead);
+    way.section = min(faces.behind, faces.ahead);
     // A cell whose every face is a wall that the light leaves, or none of them one it could come from, has no cross-section.
     way.section = way.section > 1e-3 * whole ? way.section : whole;
-    way.taken = max(way.section - open_ahead, 0.0);
+    way.taken = max(way.section - faces.open_ahead, 0.0);
     // In a dead end all of it ends.
-    way.taken *= open_ahead > 1e-3 * whole && in_way > 0.0 ? taking / in_way : 1.0;
-    way.passed = open_ahead > 0.0 ? (way.section - way.taken) / open_ahead : 0.0;
+    way.taken *= faces.in_way > 0.0 && faces.open_ahead > 1e-3 * whole ? faces.taking / faces.in_way : 1.0;
+    way.passed = faces.open_ahead > 0.0 ? (way.section - way.taken) / faces.open_ahead : 0.0;
     return way;
 }
 #endif
