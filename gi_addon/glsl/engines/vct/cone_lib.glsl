@@ -113,10 +113,13 @@ Meeting first_sheet(sampler3D sheets, sampler3D extents, Cone cone, ivec3 cell, 
 {
     Meeting first = NOTHING_MET;
     vec3 from = cone.start - vec3(cell) - 0.5;
-    for (int part = 0; part < 6; ++part) {
-        if ((kinds >> part & 1u) == 0u) {
-            continue;
+    // By what there is, not by part: cones side by side are in cells of other sides, and go through this in step.
+    for (int k = 0; k < 6; ++k) {
+        if (kinds == 0u) {
+            break;
         }
+        int part = findLSB(kinds);
+        kinds &= kinds - 1u;
         Sheet sheet = sheet_at(sheets, cell, size, part);
         float sign_ = (part & 1) == 0 ? 1.0 : -1.0;
         // Height over the front, along the axis: at the start, per length, where the ray enters and where it leaves.
