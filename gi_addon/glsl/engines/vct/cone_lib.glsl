@@ -154,7 +154,12 @@ vec3 leaving_light(sampler3D atlas, sampler3D back, Grid grid, Cone cone, Meetin
     vec3 p = cone.start + cone.direction * met.t;
     vec3 layer = (floor(vec3(met.cell) * exp2(-lod)) + 0.5) * exp2(lod);
     vec3 uvw = mix(p, layer, equal(ivec3(met.part >> 1), ivec3(0, 1, 2))) / grid.size;
-    vec4 light = met.front ? part_at(atlas, grid, uvw, lod, met.part) : textureLod(back, uvw, lod);
+    vec4 light;
+    if (met.front) {
+        light = part_at(atlas, grid, uvw, lod, met.part);
+    } else {
+        light = textureLod(back, uvw, lod); // seldom
+    }
     return light.a > 0.0 ? light.rgb * (radiance_unit / light.a) : vec3(0.0);
 }
 
