@@ -264,6 +264,8 @@ class ConeHits(Pass):
         Texture("vct.hits", "cone_hits", "packed (hits_lib.glsl): offset to what a cone of the block met first, cells; its "
                 "normal; radiance that it brings, W/(m²·sr)", "rgba32ui", lambda f: (*gather_size(f), f.settings.vct.cones),
                 layers=True, scratch=True),
+        Texture("vct.joined", "joined_to", "a bit for each of four neighbours (PAIR in receiver.glsl) that is of the block's surface, "
+                "with nothing between", "r8", gather_size, scratch=True),
     )  # fmt: skip
     uniforms = _CONE_UNIFORMS
     shaders = {"main": {"compute": "engines/vct/gather_low_comp.glsl"}}
@@ -285,7 +287,7 @@ class SharedHits(ScreenPass):
 
     title = "Voxel Interpolated Indirect Lighting (shared cones)"
     figure = "Voxel Interpolated Indirect Lighting Computation"
-    reads = (*_VOLUMES, *_BLOCKS, "vct.hits")
+    reads = (*_VOLUMES, *_BLOCKS, "vct.hits", "vct.joined")
     writes = (
         Texture("indirect.low", "low_indirect", LIGHT, "rgba32f", gather_size, scratch=True),
         Texture("indirect.low.direction", "low_direction", DIRECTION, "rgba32f", gather_size, scratch=True),

@@ -32,7 +32,15 @@ void main()
         trace_hits(position_ws, n, ng, cone_run(pixel), own);
         Gatherer here = gatherer(position_ws, n, ng);
         ivec2 block = (pixel + gather_grid_offset()) / GATHER_SCALE;
-        radiance = shared_light(here, own, position_ws, float(GATHER_SCALE) * pixel_width(depth), block, NEXT, false).radiance;
+        Gatherer there;
+        uint shared_ = 0u; // a bit for each block around
+        for (int i = 0; i < NEXT * NEXT; ++i) {
+            ivec2 other = block + window_step(i, NEXT);
+            if (on_same_surface(here, other, position_ws, float(GATHER_SCALE) * pixel_width(depth), there)) {
+                shared_ |= see_each_other(here, there) ? 1u << i : 0u;
+            }
+        }
+        radiance = shared_light(here, own, block, NEXT, shared_).radiance;
     }
     indirect_diffuse = vec4(radiance, 1.0);
 #endif
