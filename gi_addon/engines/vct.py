@@ -43,6 +43,7 @@ from ..passes.screen import (
     no_gloss,
     no_indirect,
 )
+from ..passes.smoothing import BlockSmoothing, raw_gather
 from ..passes.subsurface import Subsurface, SubsurfaceBack
 from ..passes.volumetric import MEDIUM_UNIFORMS, Volumetric, medium_defines, set_medium
 from ..passes.voxels import GRID_UNIFORMS, VoxelGrid, Voxelisation, voxel_atlas, voxel_grid
@@ -71,6 +72,7 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         VoxelAO(),
         ConeHits(),
         SharedHits(),
+        BlockSmoothing("indirect.low", "Voxel Interpolated Indirect Lighting (smoothing)", in_pairs=True),
         IndirectLighting(),
         GlossyCones(),
         *reflection_sharing(settings),
@@ -288,10 +290,7 @@ class SharedHits(ScreenPass):
     title = "Voxel Interpolated Indirect Lighting (shared cones)"
     figure = "Voxel Interpolated Indirect Lighting Computation"
     reads = (*_VOLUMES, *_BLOCKS, "vct.hits", "vct.joined")
-    writes = (
-        Texture("indirect.low", "low_indirect", LIGHT, "rgba32f", gather_size, scratch=True),
-        Texture("indirect.low.direction", "low_direction", DIRECTION, "rgba32f", gather_size, scratch=True),
-    )  # fmt: skip
+    writes = raw_gather("indirect.low")
     uniforms = _CONE_UNIFORMS
     fragment = "engines/vct/share_frag.glsl"
 

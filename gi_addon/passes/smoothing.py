@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from ..facts import Facts
 from ..graph import Texture
-from .gbuffer import gather_size
+from .gbuffer import gather_scale, gather_size
 from .screen import DIRECTION, LIGHT, ScreenPass
 
 
@@ -33,4 +33,4 @@ class BlockSmoothing(ScreenPass):
         )  # fmt: skip
 
     def defines(self, facts: Facts) -> dict[str, int]:
-        return {"GATHER_SCALE": facts.settings.gather_scale, "IN_PAIRS": int(self.in_pairs)}
+        return {"GATHER_SCALE": gather_scale(facts), "IN_PAIRS": int(self.in_pairs)}

@@ -40,7 +40,8 @@ void main()
                 shared_ |= see_each_other(here, there) ? 1u << i : 0u;
             }
         }
-        radiance = shared_light(here, own, block, NEXT, shared_).radiance;
+        float nearness;
+        radiance = shared_light(here, own, block, NEXT, shared_, nearness).radiance;
     }
     indirect_diffuse = vec4(radiance, 1.0);
 #endif

@@ -36,8 +36,8 @@ void main()
 {
     ivec2 block = ivec2(gl_FragCoord.xy);
     Receiver r = gather_receiver(block);
-    low_indirect = vec4(0.0);
-    low_direction = vec4(0.0);
+    raw_indirect = vec4(0.0);
+    raw_direction = vec4(0.0);
     if (!r.exists) {
         return;
     }
@@ -55,7 +55,8 @@ void main()
             shared_ |= sees_block(block, step_) ? 1u << i : 0u;
         }
     }
-    Gathered g = shared_light(here, own, block, SIDE, shared_);
-    low_indirect = vec4(g.radiance, 1.0);
-    low_direction = g.direction;
+    float nearness;
+    Gathered g = shared_light(here, own, block, SIDE, shared_, nearness);
+    raw_indirect = vec4(g.radiance, nearness);
+    raw_direction = g.direction;
 }

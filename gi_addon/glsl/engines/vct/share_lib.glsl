@@ -25,10 +25,10 @@ float facing(Gatherer g, vec3 offset, vec3 normal)
     return dot(offset, g.ng) > 0.0 ? cosines / sqr(square) : 0.0;
 }
 
-// Adds a cone's light and its weight.
-void add_hit(inout Gathered sum, inout float weights, Gatherer g, Hit hit, float weight)
+// Adds a cone's light, its weight, and that over its length in cells.
+void add_hit(inout Gathered sum, inout vec2 weights, Gatherer g, Hit hit, float weight)
 {
-    weights += weight;
+    weights += weight * vec2(1.0, inversesqrt(max(dot(hit.offset, hit.offset), sqr(LIFT))));
     sum.radiance += hit.radiance * weight;
 #if GATHER_SCALE > 1 // else nothing is interpolated
     if (hit.radiance != vec3(0.0)) {
@@ -39,12 +39,12 @@ void add_hit(inout Gathered sum, inout float weights, Gatherer g, Hit hit, float
 
 // E/π at a point by its own cones, and those of `side` × `side` blocks around `block`, a bit in `shared_` each. All weights add up
 // to the number of cones but for their noise, which their sum takes out: what meets nothing counts as the side of the grid where it
-// leaves.
-Gathered shared_light(Gatherer here, uvec4 own[CONES], ivec2 block, int side, uint shared_)
+// leaves. `nearness` is the mean of 1/distance of all that is met, 1/m.
+Gathered shared_light(Gatherer here, uvec4 own[CONES], ivec2 block, int side, uint shared_, out float nearness)
 {
     float k = float(bitCount(shared_));
     Gathered sum = Gathered(vec3(0.0), vec4(0.0));
-    float weights = 0.0;
+    vec2 weights = vec2(0.0);
     Hit hits[CONES];
     float g_own[CONES];
     float own_weights[CONES];
@@ -75,6 +75,7 @@ Gathered shared_light(Gatherer here, uvec4 own[CONES], ivec2 block, int side, ui
     for (int j = 0; j < CONES; ++j) {
         add_hit(sum, weights, here, hits[j], own_weights[j]);
     }
-    sum.radiance /= max(weights, 1e-6);
+    sum.radiance /= max(weights.x, 1e-6);
+    nearness = weights.y / max(weights.x * grid_cell, 1e-30);
     return sum;
 }
