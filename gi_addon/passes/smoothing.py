@@ -33,4 +33,4 @@ class BlockSmoothing(ScreenPass):
         )  # fmt: skip
 
     def defines(self, facts: Facts) -> dict[str, int]:
-        return {"GATHER_SCALE": gather_scale(facts), "IN_PAIRS": int(self.in_pairs)}
+        return {"GATHER_SCALE": gather_scale(facts), "IN_PAIRS": int(self.in_pairs), "RADIUS": int(__import__("os").environ.get("RADIUS",1)), "SOFT": 1, "REACH": float(__import__("os").environ.get("REACH",1))}

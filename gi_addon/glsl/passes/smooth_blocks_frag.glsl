@@ -16,14 +16,14 @@
 #include "passes/gather_receiver.glsl"
 
 // Whether there is a block `other` and it shows the surface of `here`, no farther off than what lights either.
-bool same_surface(ivec2 other, ivec2 last, Receiver here, float nearness, float off_plane)
+float same_surface(ivec2 other, ivec2 last, Receiver here, float nearness, float off_plane)
 {
     if (any(lessThan(other, ivec2(0))) || any(greaterThan(other, last))) {
-        return false;
+        return 0.0;
     }
     Receiver there = gather_receiver(other);
-    return on_surface(there, here.position_ws, here.ng, off_plane) &&
-           distance(there.position_ws, here.position_ws) * max(nearness, texelFetch(raw_indirect, other, 0).a) <= 1.0;
+    float d = distance(there.position_ws, here.position_ws) * max(nearness, texelFetch(raw_indirect, other, 0).a) / REACH;
+    return on_surface(there, here.position_ws, here.ng, off_plane) ? max(1.0 - (SOFT != 0 ? d * d : floor(min(d, 1.0))), 0.0) : 0.0;
 }
 
 void main()
@@ -40,16 +40,19 @@ void main()
     float share = IN_PAIRS != 0 && GATHER_SCALE > 1 ? 1.0 / float(view.subframe + 1u) : 1.0;
     float nearness = low_indirect.a;
     float weight = 1.0;
-    for (int k = 0; k < PAIRS; ++k) {
-        ivec2 a = block + PAIR[k];
-        ivec2 b = block - PAIR[k];
-        bool has_a = same_surface(a, last, here, nearness, off_plane);
-        bool has_b = same_surface(b, last, here, nearness, off_plane);
+    const int WIDTH = 2 * RADIUS + 1;
+    for (int k = WIDTH * WIDTH / 2 + 1; k < WIDTH * WIDTH; ++k) {
+        ivec2 step_ = ivec2(k % WIDTH, k / WIDTH) - RADIUS;
+        ivec2 a = block + step_;
+        ivec2 b = block - step_;
+        float has_a = same_surface(a, last, here, nearness, off_plane);
+        float has_b = same_surface(b, last, here, nearness, off_plane);
         if (IN_PAIRS != 0) {
-            has_a = has_b = has_a && has_b;
+            has_a = has_b = min(has_a,has_b);
         }
-        float w_a = has_a ? WEIGHT[k] * share : 0.0;
-        float w_b = has_b ? WEIGHT[k] * share : 0.0;
+        vec2 tent = 1.0 - vec2(abs(step_)) / float(RADIUS + 1);
+        float w_a = tent.x * tent.y * share * has_a;
+        float w_b = tent.x * tent.y * share * has_b;
         a = clamp(a, ivec2(0), last);
         b = clamp(b, ivec2(0), last);
         low_indirect += w_a * texelFetch(raw_indirect, a, 0) + w_b * texelFetch(raw_indirect, b, 0);
