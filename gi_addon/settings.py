@@ -266,7 +266,7 @@ class VCTSettings:
         higher="thinner walls hold, finer bounce light", lower="faster, less memory",
     )  # fmt: skip
     cones: int = _setting(
-        6, "Cones", "Cones traced from each point into its hemisphere and sub-frame", low=1, high=64,
+        12, "Cones", "Cones traced from each point into its hemisphere and sub-frame", low=1, high=64,
         higher="finer directions, sharper contact", lower="faster, blurrier",
     )  # fmt: skip
     shadow_cones: bool = _setting(

@@ -52,6 +52,11 @@ from ..passes.world_rays import WorldRays
 from ..settings import Settings
 
 
+# Blocks that the light of one is smoothed over, each way, where nothing that lights them is near (passes/smooth_blocks_frag.glsl). 5 × 5
+# blocks have one set of directions, whose error they share: less than twice as wide is of little use.
+_SMOOTH = 4
+
+
 def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
     """Figure 4c, in order."""
     return [
@@ -72,7 +77,9 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         VoxelAO(),
         ConeHits(),
         SharedHits(),
-        BlockSmoothing("indirect.low", "Voxel Interpolated Indirect Lighting (smoothing)", in_pairs=True),
+        BlockSmoothing(
+            "indirect.low", "Voxel Interpolated Indirect Lighting (smoothing)", in_pairs=True, radius=_SMOOTH, seen="vct.seen"
+        ),
         IndirectLighting(),
         GlossyCones(),
         *reflection_sharing(settings),
@@ -290,7 +297,10 @@ class SharedHits(ScreenPass):
     title = "Voxel Interpolated Indirect Lighting (shared cones)"
     figure = "Voxel Interpolated Indirect Lighting Computation"
     reads = (*_VOLUMES, *_BLOCKS, "vct.hits", "vct.joined")
-    writes = raw_gather("indirect.low")
+    writes = (
+        *raw_gather("indirect.low"),
+        Texture("vct.seen", "seen_blocks", "a bit for each of 5 × 5 blocks around that shares its cones", "r32ui", gather_size, scratch=True),
+    )  # fmt: skip
     uniforms = _CONE_UNIFORMS
     fragment = "engines/vct/share_frag.glsl"
 

@@ -20,17 +20,22 @@ def raw_gather(low: str) -> tuple[Texture, Texture]:
 
 class BlockSmoothing(ScreenPass):
     """Neighbouring blocks of one surface share their directions: ``low``.raw becomes ``low``, for passes/interpolate.glsl.
-    ``in_pairs`` leaves light that falls off towards a surface's edge as it is, with more noise there."""
+    ``in_pairs`` leaves light that falls off towards a surface's edge as it is, with more noise there; ``radius`` in blocks; ``seen`` holds a bit for
+    each of 5 × 5 blocks that nothing is before."""
 
     fragment = "passes/smooth_blocks_frag.glsl"
 
-    def __init__(self, low: str, title: str, figure: str = "", *, in_pairs: bool = False) -> None:
-        self.title, self.figure, self.in_pairs = title, figure, in_pairs
-        self.reads = (f"{low}.raw", f"{low}.raw_direction", "gbuffer.low_depth", "gbuffer.low_normal", "gbuffer.low_pixel")
+    def __init__(
+        self, low: str, title: str, figure: str = "", *, in_pairs: bool = False, radius: int = 1, seen: str = ""
+    ) -> None:  # fmt: skip
+        self.title, self.figure, self.in_pairs, self.radius, self.seen = title, figure, in_pairs, radius, seen
+        self.reads = (f"{low}.raw", f"{low}.raw_direction", "gbuffer.low_depth", "gbuffer.low_normal", "gbuffer.low_pixel", *([seen] if seen else []))  # fmt: skip
         self.writes = (
             Texture(low, "low_indirect", LIGHT, "rgba32f", gather_size, scratch=True),
             Texture(f"{low}.direction", "low_direction", DIRECTION, "rgba32f", gather_size, scratch=True),
         )  # fmt: skip
 
     def defines(self, facts: Facts) -> dict[str, int]:
-        return {"GATHER_SCALE": gather_scale(facts), "IN_PAIRS": int(self.in_pairs), "RADIUS": int(__import__("os").environ.get("RADIUS",1)), "SOFT": 1, "REACH": float(__import__("os").environ.get("REACH",1))}
+        return {
+            "GATHER_SCALE": gather_scale(facts), "IN_PAIRS": int(self.in_pairs), "RADIUS": self.radius, "HAS_SEEN": int(bool(self.seen)),
+        }  # fmt: skip

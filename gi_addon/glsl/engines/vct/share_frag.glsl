@@ -38,6 +38,7 @@ void main()
     Receiver r = gather_receiver(block);
     raw_indirect = vec4(0.0);
     raw_direction = vec4(0.0);
+    seen_blocks = 0u;
     if (!r.exists) {
         return;
     }
@@ -48,15 +49,14 @@ void main()
     Gatherer here = gatherer(r.position_ws, r.n, r.ng);
     float off_plane = float(GATHER_SCALE) * pixel_width(r.depth);
     Gatherer there;
-    uint shared_ = 0u; // a bit for each block around
     for (int i = 0; i < SIDE * SIDE; ++i) {
         ivec2 step_ = window_step(i, SIDE);
         if (step_ != ivec2(0) && on_same_surface(here, block + step_, r.position_ws, off_plane, there)) {
-            shared_ |= sees_block(block, step_) ? 1u << i : 0u;
+            seen_blocks |= sees_block(block, step_) ? 1u << i : 0u;
         }
     }
     float nearness;
-    Gathered g = shared_light(here, own, block, SIDE, shared_, nearness);
+    Gathered g = shared_light(here, own, block, SIDE, seen_blocks, nearness);
     raw_indirect = vec4(g.radiance, nearness);
     raw_direction = g.direction;
 }
