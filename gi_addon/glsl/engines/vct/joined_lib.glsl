@@ -46,7 +46,7 @@ bool see_each_other(Gatherer here, Gatherer there)
     }
     float reach = length(way);
     Cone cone = Cone(from, way / max(reach, 1e-6), 0.0, reach, 0.0);
-    return trace_open(voxel_sheets, voxel_extents, voxel_kinds, voxel_grid(), cone) > 0.5;
+    return trace_open(voxel_sheets, voxel_rows, voxel_kinds, voxel_grid(), cone) > 0.5;
 }
 
 // The i-th block of a window of `side` × `side` about a block.
