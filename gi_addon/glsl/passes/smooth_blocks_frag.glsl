@@ -42,9 +42,11 @@ float how_far(ivec2 other, ivec2 last, Receiver here, float nearness, float off_
         return FAR;
     }
     Receiver there = gather_receiver(other);
+#if !HAS_SEEN // else it is known to be of the surface
     if (!on_surface(there, here.position_ws, here.ng, off_plane)) {
         return FAR;
     }
+#endif
     return distance(there.position_ws, here.position_ws) * max(nearness, texelFetch(raw_indirect, other, 0).a);
 }
 
