@@ -328,7 +328,7 @@ class IndirectLighting(ScreenPass):
     title = "Voxel Lighting Computation"
     figure = "Voxel Lighting Computation"
     reads = (
-        *_VOLUMES, "gbuffer.depth", "gbuffer.normal", *_BLOCKS, "vct.hits", "indirect.low", "indirect.low.direction",
+        *_VOLUMES, "gbuffer.depth", "gbuffer.normal", *_BLOCKS, "vct.hits", "vct.seen", "indirect.low", "indirect.low.direction",
     )  # fmt: skip
     writes = (INDIRECT_DIFFUSE,)
     uniforms = _CONE_UNIFORMS
