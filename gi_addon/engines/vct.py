@@ -31,9 +31,7 @@ from ..passes.occupancy import Occupancy
 from ..passes.reflections import GLOSSY_RAY, GLOSSY_TRACED, reflection_sharing
 from ..passes.resolve import Resolve
 from ..passes.screen import (
-    DIRECTION,
     INDIRECT_DIFFUSE,
-    LIGHT,
     LOBE,
     REFRACTING,
     TRANSMISSION_INDIRECT,
@@ -60,8 +58,7 @@ from ..passes.world_guide import WorldGuide
 from ..passes.world_rays import WorldRays
 from ..settings import Settings
 
-
-# Blocks that the light of one is smoothed over, each way, where nothing that lights them is near (passes/smooth_blocks_frag.glsl). 5 × 5
+# Blocks that the light of one is smoothed over, each way, where nothing that lights them is near (smooth_blocks_frag.glsl). 5 × 5
 # blocks have one set of directions, whose error they share: less than twice as wide is of little use.
 _SMOOTH = 4
 
@@ -108,8 +105,8 @@ def _unlit(facts: Facts) -> str | None:
     return no_bounce(facts) or (None if facts.lit or facts.glowing_voxels else "no light shines")
 
 
-# The largest number that half floats hold, and how many sheets of a cell send light by their backs into one texel.
-_HALF_END, _SHEETS = 65504.0, 6
+# The largest number that half floats hold.
+_HALF_END = 65504.0
 
 
 def _irradiance_near(source: Source, distance: float) -> float:
@@ -141,7 +138,7 @@ def radiance_unit(facts: Facts) -> float:
         else:
             irradiance += float(brightest @ emitters.areas()) / near**2
     most = max((irradiance / np.pi + most) * max(facts.settings.bounces, 1), np.finfo("f4").tiny)
-    return float(2.0 ** np.ceil(np.log2(most * _SHEETS / _HALF_END)))
+    return float(2.0 ** np.ceil(np.log2(most / _HALF_END)))
 
 
 def _one_bounce(facts: Facts) -> str | None:
@@ -175,12 +172,12 @@ class RadianceInjection(Pass):
     writes = (
         Texture("vct.radiance", "voxel_radiance", "by sheet: radiance × alpha, in units, that leaves its front; alpha, the share "
                 "of the cell's face that it covers", "rgba16f", all_sheets, access="readwrite", scratch=True),
-        Texture("vct.back", "voxel_back", "by cell, with its first sheet: radiance × alpha, in units, that leaves sheets by "
-                "their backs; alpha, the sum of what they cover", "rgba16f", all_sheets, access="readwrite", scratch=True),
+        Texture("vct.back", "voxel_back", "the same that leaves its back", "rgba16f", all_sheets, access="readwrite",
+                scratch=True),
         Texture("vct.bounce", "voxel_bounce", "by sheet of the cells: radiance of the later bounces, in units", "rgba16f",
                 cell_sheets, when=_one_bounce, scratch=True),
-        Texture("vct.bounce_back", "voxel_bounce_back", "the same by the surfaces' backs, with the cell's first sheet", "rgba16f",
-                cell_sheets, when=_one_bounce, scratch=True),
+        Texture("vct.bounce_back", "voxel_bounce_back", "the same by its back", "rgba16f", cell_sheets, when=_one_bounce,
+                scratch=True),
     )  # fmt: skip
     uniforms = (
         *_LIGHT_UNIFORMS,
@@ -284,8 +281,8 @@ class ConeHits(Pass):
         Texture("vct.hits", "cone_hits", "packed (hits_lib.glsl): offset to what a cone of the block met first, cells; its "
                 "normal; radiance that it brings, W/(m²·sr)", "rgba32ui", lambda f: (*gather_size(f), f.settings.vct.cones),
                 layers=True, scratch=True),
-        Texture("vct.joined", "joined_to", "a bit for each of four neighbours (PAIR in receiver.glsl) that is of the block's surface, "
-                "with nothing between", "r8", gather_size, scratch=True),
+        Texture("vct.joined", "joined_to", "a bit for each of four neighbours (PAIR in receiver.glsl) that is of the block's "
+                "surface, with nothing between", "r8", gather_size, scratch=True),
     )  # fmt: skip
     uniforms = _CONE_UNIFORMS
     shaders = {"main": {"compute": "engines/vct/gather_low_comp.glsl"}}
@@ -310,7 +307,8 @@ class SharedHits(ScreenPass):
     reads = (*_VOLUMES, *_BLOCKS, "vct.hits", "vct.joined")
     writes = (
         *raw_gather("indirect.low"),
-        Texture("vct.seen", "seen_blocks", "a bit for each of 5 × 5 blocks around that shares its cones", "r32ui", gather_size, scratch=True),
+        Texture("vct.seen", "seen_blocks", "a bit for each of 5 × 5 blocks around that shares its cones", "r32ui", gather_size,
+                scratch=True),
     )  # fmt: skip
     uniforms = _CONE_UNIFORMS
     fragment = "engines/vct/share_frag.glsl"

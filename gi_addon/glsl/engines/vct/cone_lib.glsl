@@ -155,9 +155,9 @@ vec3 leaving_light(sampler2D atlas, sampler2D back, usampler2D rows, sampler3D k
     int within = met.cell[met.part >> 1] >> level;
     vec4 light;
     if (met.front) {
-        light = light_at(atlas, rows, kinds, grid, level, p, within, met.part, true);
+        light = light_at(atlas, rows, kinds, grid, level, p, within, met.part);
     } else {
-        light = light_at(back, rows, kinds, grid, level, p, within, met.part, false); // seldom
+        light = light_at(back, rows, kinds, grid, level, p, within, met.part); // seldom
     }
     return light.a > 0.0 ? light.rgb * (radiance_unit / light.a) : vec3(0.0);
 }
