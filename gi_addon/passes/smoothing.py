@@ -20,9 +20,9 @@ def raw_gather(low: str) -> tuple[Texture, Texture]:
 
 class BlockSmoothing(ScreenPass):
     """Neighbouring blocks of one surface share their directions: ``low``.raw becomes ``low``, for passes/interpolate.glsl.
-    ``in_pairs`` leaves light that falls off towards a surface's edge as it is, with more noise there; ``radius`` counts blocks each
-    way. ``seen`` names a texture with a bit for each of 5 × 5 blocks that are of a block's surface with nothing between; without it
-    that is taken from the G-buffer and from how near what lights a block is."""
+    ``in_pairs`` leaves light that falls off towards a surface's edge as it is, with more noise there; ``radius`` counts blocks
+    each way. ``seen`` names a texture with a bit for each of 5 × 5 blocks that are of a block's surface with nothing between;
+    without it that is taken from the G-buffer and from how near what lights a block is."""
 
     fragment = "passes/smooth_blocks_frag.glsl"
 
