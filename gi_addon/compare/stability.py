@@ -59,11 +59,7 @@ TRAITS: dict[str, Traits] = {
 # Failures that are known, with their causes: shown beside the verdict. A test that fails and is not listed here fails the
 # test suite too.
 # Numbers beside a cause are what trying it gave; the others are measured only.
-KNOWN: dict[tuple[str, str], str] = {
-    ("LPV", "1"): "a lamp 0.2 R from the wall: g = 0.944 in a grid of 32 cells. All of the flux ends at the walls and the whole "
-    "sphere's mean is 1.00, but the lit patch lights its own surroundings along the wall, over a rise of a third of a cell: 0.7 "
-    "there, 0.9 to 45 degrees, 1.2 opposite; 288 directions 0.70 and 1.16",
-}
+KNOWN: dict[tuple[str, str], str] = {}
 
 
 @dataclass(frozen=True)
