@@ -510,8 +510,8 @@ def test_shared_cones_add_no_light_and_lose_none(gl):
 
 
 def test_light_is_not_smoothed_through_a_thin_wall(gl):
-    """A wall of a tenth of a cell: its far side gets .1 % of the lit one's light; 1 % where blocks on either side of it are smoothed
-    over as if one saw the other."""
+    """A wall of a tenth of a cell: its far side gets .1 % of the lit one's light; 1 % where blocks on either side of it are
+    smoothed over as if one saw the other."""
     suite = Suite("VCT")
     assert leak(suite, 0.1, 0.0, 0.0, suite.cell(scenes.thin_wall(0.1))) <= 0.004
     suite.close()
