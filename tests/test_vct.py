@@ -12,7 +12,8 @@ from conftest import make
 
 from gi_addon.compare import scenes
 from gi_addon.compare.closed_forms import polygon_form_factor
-from gi_addon.compare.stability_checks import wall_reference
+from gi_addon.compare.stability import PASS, Suite, run_one
+from gi_addon.compare.stability_checks import leak, wall_reference
 from gi_addon.gl import GL, shared
 from gi_addon.outputs import OUTPUTS
 from gi_addon.renderer import Renderer, inspect
@@ -506,6 +507,22 @@ def test_shared_cones_add_no_light_and_lose_none(gl):
     exact = wall_reference(scene.camera, (64, 36), floor, 0.8 * 5.0)
     image = vct(scene, "Diffuse Indirect", samples=8, resolution=(64, 36), use_ao=False).passes["Diffuse Indirect"][..., 0]
     assert abs(np.nansum(np.where(np.isnan(exact), np.nan, image)) / np.nansum(exact) - 1.0) <= 0.03
+
+
+def test_light_is_not_smoothed_through_a_thin_wall(gl):
+    """A wall of a tenth of a cell: its far side gets .1 % of the lit one's light; 1 % where blocks on either side of it are
+    smoothed over as if one saw the other."""
+    suite = Suite("VCT")
+    assert leak(suite, 0.1, 0.0, 0.0, suite.cell(scenes.thin_wall(0.1))) <= 0.004
+    suite.close()
+
+
+def test_a_wall_keeps_still_while_the_picture_moves_by_half_a_pixel(gl):
+    """Stability test 6: noise against the exact light of each frame's own points, one sub-frame."""
+    suite = Suite("VCT")
+    finding = run_one(suite, "6")
+    suite.close()
+    assert finding.verdict == PASS, finding.quantities
 
 
 @pytest.mark.parametrize("power", [1e-9, 1e9])
