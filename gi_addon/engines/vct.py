@@ -45,7 +45,7 @@ from ..passes.screen import (
 )
 from ..passes.subsurface import Subsurface, SubsurfaceBack
 from ..passes.volumetric import MEDIUM_UNIFORMS, Volumetric, medium_defines, set_medium
-from ..passes.voxels import GRID_UNIFORMS, VoxelGrid, Voxelisation, voxel_atlas, voxel_grid
+from ..passes.voxels import GRID_UNIFORMS, VoxelGrid, Voxelisation, no_bodies, voxel_atlas, voxel_grid
 from ..passes.world_guide import WorldGuide
 from ..passes.world_rays import WorldRays
 from ..settings import Settings
@@ -84,6 +84,10 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         VoxelVolumetric(),
         Resolve(layers),
     ]
+
+
+# Walks through a body from each of its sheets, threes for the colours, in all sub-frames and, where a light moves, in one at least.
+WALKS, LEAST_WALKS = 192, 12
 
 
 def _unlit(facts: Facts) -> str | None:
@@ -151,7 +155,7 @@ class RadianceInjection(Pass):
     figure = "Voxel Radiance Injection, Voxel Anisotropic Mipmap Generation"
     reads = (
         "voxels.sheets", "voxels.kinds", "voxels.albedo", Optional("voxels.extents", ("vct.bounce",)),
-        Optional("voxels.emission"), Optional("voxels.lamps"),
+        Optional("voxels.emission"), Optional("voxels.lamps"), Optional("voxels.bodies"),
         Optional("rsm.depth"), Optional("rsm.albedo"), Optional("rsm.normal"), Optional("rsm.lights"), Optional("rsm.views"),
     )  # fmt: skip
     writes = (
@@ -163,6 +167,8 @@ class RadianceInjection(Pass):
                 filter="linear", scratch=True),
         Texture("vct.bounce", "voxel_bounce", "by side and axis: radiance of the later bounces, W/(m²·sr)", "rgba16f",
                 voxel_atlas, when=_one_bounce, scratch=True),
+        Texture("vct.walked", "voxel_walked", "vct.radiance after light has walked through bodies", "rgba16f", voxel_atlas,
+                when=no_bodies, scratch=True),
         Texture("vct.bounce_back", "voxel_bounce_back", "the same by the surfaces' backs", "rgba16f",
                 lambda f: voxel_grid(f).size, when=_one_bounce, scratch=True),
     )  # fmt: skip
@@ -172,16 +178,19 @@ class RadianceInjection(Pass):
         Uniform("view_count", "int", "reflective shadow maps in the list"),
         Uniform("first_time", "int", "1 when empty cells are due too"),
         Uniform("add_bounce", "int", "1 when later bounces are known"),
+        Uniform("walk_count", "int", "walks from each sheet of a body; 0 to take over what the last ones found"),
+        Uniform("walk_first", "uint", "number of the first"),
         Uniform("emission_scale", "float", "radiance of the brightest emitter, in units of the volumes"),
         *MEDIUM_UNIFORMS,
     )
     shaders = {
         "main": {"compute": "engines/vct/inject_comp.glsl"},
+        "bodies": {"compute": "engines/vct/bodies_comp.glsl"},
         "bounce": {"compute": "engines/vct/bounce_comp.glsl"},
         "mips": {"compute": "engines/vct/mips_comp.glsl"},
     }
     depends = ("lights", "world", "transforms", "meshes", "materials")
-    settings = ("vct.resolution", "vct.emissive_voxels", "vct.cones", "bounces", "use_area_lights")
+    settings = ("vct.resolution", "vct.emissive_voxels", "vct.cones", "bounces", "use_area_lights", "use_translucency")
     repeats = True
 
     def rate(self, facts: Facts) -> str:
@@ -208,7 +217,20 @@ class RadianceInjection(Pass):
             frame.set(program, add_bounce=int(k > 0), emission_scale=brightest / values["radiance_unit"], **values)
             set_medium(frame, program, planned.facts)
             frame.compute(planned, program, grid.size, (4, 4, 4))
+            if planned.has("voxels.bodies"):
+                self._walk(frame, planned, grid, {**values, "emission_scale": brightest / values["radiance_unit"]})
             build_mips(frame, planned, grid)
+
+    def _walk(self, frame: Frame, planned: Planned, grid: VoxelGrid, values: dict) -> None:
+        """Replace what sheets of bodies reflect by what leaves them after it has walked below the surface."""
+        program = frame.program(planned, "bodies")
+        moves = self.rate(planned.facts) == "subframe"
+        # A still light's walks are all taken at once; one that moves takes others in each sub-frame.
+        count = max(3 * -(-WALKS // (3 * planned.facts.subframes)), LEAST_WALKS) if moves else WALKS
+        for walks, light in ((count, "vct.radiance"), (0, "vct.walked")):
+            frame.resources[light].use(12)
+            frame.set(program, walk_count=walks, walk_first=count * frame.subframe if moves else 0, **values)
+            frame.compute(planned, program, (*grid.size[:2], 6 * grid.size[2]), (4, 4, 4))
 
     @staticmethod
     def _bounce(frame: Frame, planned: Planned, grid: VoxelGrid, values: dict) -> None:

@@ -23,14 +23,16 @@ from ..frame import Frame
 from ..gl.context import MIB
 from ..graph import Buffer, Optional, Pass, Planned, Texture, Uniform
 from ..scene import DIFFUSE
+from .screen import no_translucency
 
 # Sums are fixed point: this many units are one cell face of area. 32 bits then hold 4096 layers of surface in one cell.
 UNITS = 1 << 20
 # An emitter of the scene's brightest mean radiance fills 2¹⁶ units, so that textures may outshine their mean 4096 times over.
 EMISSION_UNITS = 1 << 16
 # Words per cell: area, area × opacity, albedo; of each of six sheets its area, slopes and height; squares covered; how much of
-# what is reflected is diffuse; how far each sheet reaches; emission; area of lamps by side.
-_WORDS, _EMISSION_WORDS, _LAMP_WORDS = 57, 3, 6
+# what is reflected is diffuse; how far each sheet reaches; emission; area of lamps by side; of what light scatters below the
+# surface of its area, mean free path, share, albedo, roughness and index of the way in, kinds of sheets.
+_WORDS, _EMISSION_WORDS, _LAMP_WORDS, _BODY_WORDS = 57, 3, 6, 11
 # For the sums of the layers that are made at once; OpenGL 4.3 promises storage blocks of no more than 128 MiB.
 _SLAB_BYTES = 128 * MIB
 
@@ -81,8 +83,18 @@ def _size(facts: Facts) -> tuple[int, int, int]:
     return voxel_grid(facts).size
 
 
-def _words(facts: Facts) -> int:
+def _body_word(facts: Facts) -> int:
+    """Where the words of what light scatters below the surface of begin."""
     return _WORDS + (_EMISSION_WORDS if facts.glowing_voxels else _LAMP_WORDS if _lamps(facts) else 0)
+
+
+def _words(facts: Facts) -> int:
+    return _body_word(facts) + (_BODY_WORDS if no_bodies(facts) is None else 0)
+
+
+def no_bodies(facts: Facts) -> str | None:
+    """Why no light walks through bodies from one sheet to another, or None."""
+    return no_translucency(facts) or (None if facts.bodies else "no material scatters below its surface")
 
 
 def _lamps(facts: Facts) -> bool:
@@ -122,6 +134,8 @@ class Voxelisation(Pass):
                 when=lambda f: None if f.glowing_voxels else "no voxel shines: nothing emits, or lights sampled on it do"),
         Texture("voxels.lamps", "voxel_lamps", "share of the cell's face along x, y, z that lamps cover", "rgba8", _size,
                 when=lambda f: None if _lamps(f) else "no light is drawn from emissive surfaces"),
+        Texture("voxels.bodies", "voxel_bodies", "packed (lib/body_lib.glsl) what light scatters below the surface of: mean free path, "
+                "share of what is reflected that has been there, albedo, kinds of sheets, way in", "rgba32ui", _size, when=no_bodies),
         Buffer("voxels.sums", "voxel_sums", "fixed-point sums of the layers in the making", "uint", np.dtype("u4"),
                lambda f: _slab(f) * _size(f)[0] * _size(f)[1] * _words(f), scratch=True),
         Texture("voxels.raster", "voxel_raster", "stands for the grid's layers while triangles are drawn; holds nothing",
@@ -139,7 +153,7 @@ class Voxelisation(Pass):
         "resolve": {"compute": "passes/voxels_comp.glsl"}, "empty": {"compute": "passes/voxels_empty_comp.glsl"},
     }  # fmt: skip
     depends = ("transforms", "meshes", "materials")
-    settings = ("vct.resolution", "vct.emissive_voxels", "use_area_lights")
+    settings = ("vct.resolution", "vct.emissive_voxels", "use_area_lights", "use_translucency")
 
     def rate(self, facts: Facts) -> str:
         return "subframe" if facts.settings.vct.continuous_voxelization else "static"
@@ -149,7 +163,8 @@ class Voxelisation(Pass):
 
     def defines(self, facts: Facts) -> dict[str, int]:
         return {"VOXEL_UNITS": UNITS, "VOXEL_WORDS": _words(facts), "VOXEL_EMISSION": int(facts.glowing_voxels),
-                "VOXEL_LAMPS": int(_lamps(facts)), "EMISSION_UNITS": EMISSION_UNITS}
+                "VOXEL_LAMPS": int(_lamps(facts)), "EMISSION_UNITS": EMISSION_UNITS,
+                "VOXEL_BODIES": int(no_bodies(facts) is None), "BODY_WORD": _body_word(facts)}
 
     def run(self, frame: Frame, planned: Planned) -> None:
         facts = planned.facts

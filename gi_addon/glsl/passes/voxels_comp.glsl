@@ -1,6 +1,9 @@
 // Sums of the layers in the making to means (passes/voxels.py says what a texel is).
 
 #include "passes/voxel_extent.glsl"
+#if VOXEL_BODIES
+#include "lib/body_lib.glsl"
+#endif
 
 layout(local_size_x = 4, local_size_y = 4, local_size_z = 4) in;
 
@@ -41,6 +44,14 @@ void main()
 #if HAS_VOXEL_EMISSION
     vec3 emission = vec3(voxel_sums[first + 57u], voxel_sums[first + 58u], voxel_sums[first + 59u]);
     imageStore(voxel_emission, cell, vec4(emission * (float(VOXEL_UNITS) * color / float(EMISSION_UNITS)), 0.0));
+#endif
+#if HAS_VOXEL_BODIES
+    uint body = first + uint(BODY_WORD);
+    float whole = 1.0 / max(float(voxel_sums[body]), 1.0);
+    vec4 path = vec4(voxel_sums[body + 1u], voxel_sums[body + 2u], voxel_sums[body + 3u], voxel_sums[body + 4u]) * whole;
+    vec3 own = vec3(voxel_sums[body + 5u], voxel_sums[body + 6u], voxel_sums[body + 7u]) * whole;
+    vec2 entry = vec2(voxel_sums[body + 8u], voxel_sums[body + 9u]) * whole;
+    imageStore(voxel_bodies, cell, pack_body(path.rgb * LONGEST_PATH, path.a, own, voxel_sums[body + 10u], entry));
 #endif
 #if HAS_VOXEL_LAMPS
     vec3 lamps = vec3(0.0);

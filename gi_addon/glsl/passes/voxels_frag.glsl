@@ -3,6 +3,9 @@
 
 #include "surface/surface_point.glsl"
 #include "passes/voxel_extent.glsl"
+#if VOXEL_BODIES
+#include "lib/body_lib.glsl"
+#endif
 
 flat in vec3 triangle_a;
 flat in vec3 triangle_b;
@@ -194,6 +197,26 @@ void main()
 #elif VOXEL_LAMPS
         if (max3(c.emission) > 0.0) {
             add(at + 57u + uint(2 * triangle_axis + side), seen * float(VOXEL_UNITS));
+        }
+#endif
+#if VOXEL_BODIES
+        float scattered = luminance(c.subsurface);
+        if (scattered > 0.0) {
+            uint body = at + uint(BODY_WORD);
+            float amount = max(weight, 1024.0);
+            // Through what is longer than the grid light goes straight.
+            vec3 path = min(c.subsurface_radius / (scattered * grid_cell), vec3(LONGEST_PATH)) / LONGEST_PATH;
+            vec3 entry = c.subsurface_entry / scattered;
+            vec3 own = saturate(c.diffuse * (entry.z / max(luminance(c.diffuse), 1e-6))); // without what layers above take
+            add(body, amount);
+            for (int i = 0; i < 3; ++i) {
+                add(body + 1u + uint(i), amount * path[i]);
+                add(body + 5u + uint(i), amount * own[i]);
+            }
+            add(body + 4u, amount * min(scattered / max(luminance(albedo), 1e-6), 1.0));
+            add(body + 8u, amount * saturate(entry.x));
+            add(body + 9u, amount / max(entry.y, 1.0));
+            atomicOr(voxel_sums[body + 10u], 1u << uint(2 * triangle_axis + side));
         }
 #endif
     }
