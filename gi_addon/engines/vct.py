@@ -12,7 +12,7 @@ import numpy as np
 
 from ..facts import Facts
 from ..frame import Frame
-from ..graph import Optional, Pass, Planned, Texture, Uniform
+from ..graph import Buffer, Optional, Pass, Planned, Texture, Uniform
 from ..lights import Source, spread_profile
 from ..passes.brdf_tables import BRDFTables
 from ..passes.direct_lighting import DirectLighting, TranslucentLighting
@@ -86,8 +86,8 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
     ]
 
 
-# Walks through a body from each of its sheets, threes for the colours, in all sub-frames and, where a light moves, in one at least.
-WALKS, LEAST_WALKS = 192, 12
+# Walks through a body from each of its sheets, in all sub-frames, that go side by side; how many groups of those share the sheets.
+WALKS, LANES, _WALKERS = 96, 32, 1024
 
 
 def _unlit(facts: Facts) -> str | None:
@@ -169,6 +169,8 @@ class RadianceInjection(Pass):
                 voxel_atlas, when=_one_bounce, scratch=True),
         Texture("vct.walked", "voxel_walked", "vct.radiance after light has walked through bodies", "rgba16f", voxel_atlas,
                 when=no_bodies, scratch=True),
+        Buffer("vct.body_sheets", "body_sheets", "how many sheets light scatters below; 6 × number of the cell + part of each", "uint",
+               np.dtype("u4"), lambda f: 1 + 6 * int(np.prod(voxel_grid(f).size)), when=no_bodies, scratch=True),
         Texture("vct.bounce_back", "voxel_bounce_back", "the same by the surfaces' backs", "rgba16f",
                 lambda f: voxel_grid(f).size, when=_one_bounce, scratch=True),
     )  # fmt: skip
@@ -185,6 +187,7 @@ class RadianceInjection(Pass):
     )
     shaders = {
         "main": {"compute": "engines/vct/inject_comp.glsl"},
+        "body_sheets": {"compute": "engines/vct/body_sheets_comp.glsl"},
         "bodies": {"compute": "engines/vct/bodies_comp.glsl"},
         "bounce": {"compute": "engines/vct/bounce_comp.glsl"},
         "mips": {"compute": "engines/vct/mips_comp.glsl"},
@@ -197,7 +200,7 @@ class RadianceInjection(Pass):
         return RSMGeneration().rate(facts) if facts.rig.bounce.sizes else "static"
 
     def defines(self, facts: Facts) -> dict[str, int]:
-        return medium_defines(facts)
+        return {**medium_defines(facts), "WALK_LANES": LANES}
 
     def run(self, frame: Frame, planned: Planned) -> None:
         grid = voxel_grid(planned.facts)
@@ -226,11 +229,15 @@ class RadianceInjection(Pass):
         program = frame.program(planned, "bodies")
         moves = self.rate(planned.facts) == "subframe"
         # A still light's walks are all taken at once; one that moves takes others in each sub-frame.
-        count = max(3 * -(-WALKS // (3 * planned.facts.subframes)), LEAST_WALKS) if moves else WALKS
+        count = max(-(-WALKS // planned.facts.subframes), LANES) if moves else WALKS
+        frame.resources["vct.body_sheets"].clear()
+        sheets = frame.program(planned, "body_sheets")
+        frame.set(sheets, **values)
+        frame.compute(planned, sheets, grid.size, (4, 4, 4))
         for walks, light in ((count, "vct.radiance"), (0, "vct.walked")):
             frame.resources[light].use(12)
             frame.set(program, walk_count=walks, walk_first=count * frame.subframe if moves else 0, **values)
-            frame.compute(planned, program, (*grid.size[:2], 6 * grid.size[2]), (4, 4, 4))
+            frame.compute(planned, program, (_WALKERS,), (1,))
 
     @staticmethod
     def _bounce(frame: Frame, planned: Planned, grid: VoxelGrid, values: dict) -> None:

@@ -9,10 +9,10 @@
 
 #include "engines/vct/walk_lib.glsl"
 
-layout(local_size_x = 4, local_size_y = 4, local_size_z = 4) in;
+layout(local_size_x = WALK_LANES) in;
 layout(binding = 12) uniform sampler3D light_now; // vct.radiance, or vct.walked when that is due
 
-const vec3 CHANNEL[3] = vec3[3](vec3(3.0, 0.0, 0.0), vec3(0.0, 3.0, 0.0), vec3(0.0, 0.0, 3.0));
+shared vec3 found_by[WALK_LANES];
 
 // Radiance that a sheet reflects, in units.
 vec3 reflected(ivec3 cell, int part)
@@ -25,60 +25,83 @@ vec3 reflected(ivec3 cell, int part)
     return radiance;
 }
 
+// Square `which` of those that a sheet covers.
+int covered_square(Sheet sheet, int which)
+{
+    int square = 0;
+    for (int i = 0; i < 16; ++i) {
+        bool covered = (sheet.squares >> i & 1u) == 1u;
+        square = covered && which == 0 ? i : square;
+        which -= covered ? 1 : 0;
+    }
+    return square;
+}
+
+// What one walk from a sheet finds.
+vec3 walked(ivec3 cell, int part, Body body, vec3 own, int number)
+{
+    uint index = walk_first + uint(number);
+    uint seed = hash_u32(uvec3(part_texel(cell, grid_size, part >> 1, part & 1)));
+    uint state = hash_u32(uvec2(seed, index));
+    bool together = max3(body.path) - min3(body.path) <= 1e-3 * max3(body.path);
+    int channel = number % 3;
+    vec3 taken = vec3(1.0);
+    if (!together) {
+        // A third of the walks is a channel's, or one more.
+        taken = vec3(equal(ivec3(channel), ivec3(0, 1, 2))) * (float(walk_count) / float((walk_count + 2 - channel) / 3));
+    }
+    float path = body.path[channel];
+    if (path < WALK_SHORT) {
+        return taken * own;
+    }
+    Sheet sheet = sheet_at(voxel_sheets, cell, grid_size, part);
+    int square = covered_square(sheet, int(index) % bitCount(sheet.squares));
+    vec2 uv = square_middle(square) + 0.25 * (vec2(draw(state), draw(state)) - 0.5);
+    vec3 start = vec3(cell) + 0.5 + sheet_point(sheet, part, uv);
+    vec3 direction = way_in(body, frame_from_normal(sheet_normal(sheet, part)), fract(r2_sequence(index) + unit_shift(seed)), state);
+    Grid grid = Grid(grid_low, grid_cell, vec3(grid_size), grid_levels);
+    vec3 alpha = single_scattering_albedo(max(body.albedo, vec3(1e-3)));
+    Walk walk = walk_below(voxel_sheets, voxel_kinds, voxel_bodies, grid, start, direction, path, alpha, state);
+    if (max3(walk.weight) <= 0.0) {
+        return vec3(0.0);
+    }
+    vec3 there = max(unpack_body(texelFetch(voxel_bodies, walk.cell, 0)).albedo, vec3(1e-3));
+    return taken * walk.weight * reflected(walk.cell, walk.part) / there;
+}
+
 void main()
 {
-    ivec3 at = ivec3(gl_GlobalInvocationID); // z: part and cell
-    int part = at.z / grid_size.z;
-    ivec3 cell = ivec3(at.xy, at.z - part * grid_size.z);
-    if (any(greaterThanEqual(at, ivec3(grid_size.xy, 6 * grid_size.z)))) {
-        return;
-    }
-    uint kinds = kinds_of(texelFetch(voxel_kinds, cell, 0));
-    Body body = unpack_body(texelFetch(voxel_bodies, cell, 0));
-    if (kinds >= 64u || (kinds & body.parts & (1u << part)) == 0u) {
-        return;
-    }
-    ivec3 texel = part_texel(cell, grid_size, part >> 1, part & 1);
-    vec4 light = texelFetch(light_now, texel, 0);
-    if (walk_count == 0) {
-        imageStore(voxel_radiance, texel, light);
-        return;
-    }
-    Grid grid = Grid(grid_low, grid_cell, vec3(grid_size), grid_levels);
-    Sheet sheet = sheet_at(voxel_sheets, cell, grid_size, part);
-    mat3 frame = frame_from_normal(sheet_normal(sheet, part));
-    vec3 own = reflected(cell, part);
-    vec3 alpha = single_scattering_albedo(max(body.albedo, vec3(1e-3)));
-    bool together = max3(body.path) - min3(body.path) <= 1e-3 * max3(body.path);
-    int count = bitCount(sheet.squares);
-    uint seed = hash_u32(uvec3(texel));
-    vec2 turn = unit_shift(seed);
-    vec3 sum = vec3(0.0);
-    for (int k = 0; k < walk_count; ++k) {
-        int channel = k % 3;
-        uint index = walk_first + uint(k);
-        uint state = hash_u32(uvec2(seed, index));
-        vec3 taken = together ? vec3(1.0) : CHANNEL[channel];
-        if (body.path[channel] < WALK_SHORT) {
-            sum += taken * own;
+    uint lane = gl_LocalInvocationID.x;
+    uint count = body_sheets[0];
+    for (uint k = gl_WorkGroupID.x; k < count; k += gl_NumWorkGroups.x) {
+        uint entry = body_sheets[1u + k];
+        int part = int(entry % 6u);
+        int number = int(entry / 6u);
+        ivec3 cell = ivec3(number % grid_size.x, number / grid_size.x % grid_size.y, number / (grid_size.x * grid_size.y));
+        ivec3 texel = part_texel(cell, grid_size, part >> 1, part & 1);
+        if (walk_count == 0) {
+            if (lane == 0u) {
+                imageStore(voxel_radiance, texel, texelFetch(light_now, texel, 0));
+            }
             continue;
         }
-        int wanted = int(index) % count;
-        int square = 0;
-        for (int i = 0; i < 16; ++i) {
-            bool covered = (sheet.squares >> i & 1u) == 1u;
-            square = covered && wanted == 0 ? i : square;
-            wanted -= covered ? 1 : 0;
+        Body body = unpack_body(texelFetch(voxel_bodies, cell, 0));
+        vec3 own = reflected(cell, part);
+        vec3 sum = vec3(0.0);
+        for (int i = int(lane); i < walk_count; i += WALK_LANES) {
+            sum += walked(cell, part, body, own, i);
         }
-        vec2 uv = square_middle(square) + 0.25 * (vec2(draw(state), draw(state)) - 0.5);
-        vec3 start = vec3(cell) + 0.5 + sheet_point(sheet, part, uv);
-        vec3 direction = way_in(body, frame, fract(r2_sequence(index) + turn), state);
-        Walk walk = walk_below(voxel_sheets, voxel_kinds, voxel_bodies, grid, start, direction, body.path[channel], alpha, state);
-        if (max3(walk.weight) > 0.0) {
-            vec3 there = max(unpack_body(texelFetch(voxel_bodies, walk.cell, 0)).albedo, vec3(1e-3));
-            sum += taken * walk.weight * reflected(walk.cell, walk.part) / there;
+        found_by[lane] = sum;
+        barrier();
+        if (lane == 0u) {
+            // In this order: the same bits each time.
+            for (int i = 1; i < WALK_LANES; ++i) {
+                sum += found_by[i];
+            }
+            vec4 light = texelFetch(light_now, texel, 0);
+            light.rgb += body.share * (sum / float(walk_count) - own) * light.a;
+            imageStore(voxel_walked, texel, light);
         }
+        barrier();
     }
-    light.rgb += body.share * (sum / float(walk_count) - own) * light.a;
-    imageStore(voxel_walked, texel, light);
 }
