@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 import numpy as np
 
@@ -20,6 +22,10 @@ from .world_map import WorldMap
 _MOST_DOMAINS = 8
 # Points of emissive meshes per sub-frame, each with a full cube of maps.
 _EMITTER_SAMPLES = 2
+# What Facts.once has found, the oldest first: of so many scenes at a time.
+_MOST_FOUND = 16
+_FOUND: dict[tuple, object] = {}
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -63,6 +69,16 @@ class Facts:
     emitters: Emitters = field(default_factory=Emitters.none)  # all of them, sampled as lights or not
     focus: Focus = field(default_factory=lambda: Focus.on(np.zeros((2, 3))))
     eye: np.ndarray = field(default_factory=lambda: np.zeros(3))  # the camera's place, world space, m
+    scene: Scene | None = field(default=None, repr=False)
+
+    def once(self, kind: str, place: tuple, find: Callable[[Scene], T]) -> T:
+        """What ``find`` knows of the scene's surfaces at ``place``: found once as long as they stay."""
+        key = (kind, place, self.stamps["meshes"], self.stamps["transforms"])
+        if key not in _FOUND:
+            while len(_FOUND) >= _MOST_FOUND:
+                _FOUND.pop(next(iter(_FOUND)), None)
+            _FOUND[key] = find(self.scene)
+        return _FOUND[key]
 
     @property
     def glowing_voxels(self) -> bool:
@@ -169,6 +185,7 @@ def gather_facts(
         emitters=emitters,
         focus=focus,
         eye=eye,
+        scene=scene,
     )
 
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from conftest import PICTURE
+from voxel_store import places, surfaces
 
 from gi_addon.compare import scenes
 from gi_addon.engines import TECHNIQUES
@@ -14,14 +15,14 @@ from gi_addon.graph import Pass, Texture
 from gi_addon.passes.brdf_tables import BRDFTables
 from gi_addon.passes.gbuffer import GBuffer
 from gi_addon.passes.resolve import Resolve
-from gi_addon.passes.voxels import Voxelisation, voxel_grid
+from gi_addon.passes.voxels import Voxelisation, sheet_counts
 from gi_addon.renderer import Renderer
 from gi_addon.settings import Settings
 
 
 class _Reader(Pass):
     title = "Voxel Reader"
-    reads = ("voxels.sheets", "voxels.kinds", "voxels.albedo")
+    reads = ("voxels.sheets", "voxels.kinds")
     writes = (Texture("indirect.diffuse", "indirect_diffuse", "nothing, for the test", "rgba32f", lambda f: f.resolution),)
 
     def run(self, frame, planned):
@@ -54,18 +55,7 @@ def voxels(gl, monkeypatch):
             if change is not None:
                 change(scene)
                 ran = list(renderer.render(scene, chosen, ("Combined",), resolution=PICTURE, timed=True).milliseconds)
-            grid = voxel_grid(renderer.frame.facts)
-            x, y, z = grid.size
-            out = {}
-            for name in reader.reads:
-                texture = renderer.frame.resources[name]
-                dtype = {"f1": np.uint8, "f2": np.float16, "nu2": np.uint16}[texture.dtype]
-                data = np.frombuffer(texture.read(alignment=1), dtype)
-                out[name.split(".")[1]] = data.reshape(*texture.size[::-1], -1).astype("f4")
-            out["albedo"] /= 255.0
-            out["opacity"] = out["kinds"][..., 1] / 255.0
-            # (axis, side, z, y, x, [slope u, slope v, height, squares])
-            out["sheets"] = out["sheets"].reshape(3, z, y, 2, x, 4).transpose(0, 3, 1, 2, 4, 5)
+            grid, out = surfaces(renderer)
             renderer.close()
             return grid, out, ran
 
@@ -285,15 +275,45 @@ def test_a_moved_object_leaves_nothing_behind(voxels):
         np.testing.assert_array_equal(after[name], fresh[name])
 
 
-def test_layers_made_in_parts_are_the_same(voxels, monkeypatch):
-    """The grid is made a few layers at a time where its sums would be large; the result does not show it."""
+def test_sheets_made_in_parts_are_the_same(voxels, monkeypatch):
+    """Sheets are made some at a time where their sums would be large; the result does not show it."""
     import gi_addon.passes.voxels as module
 
     _, whole, _ = voxels(scenes.cornell(), 24)
-    monkeypatch.setattr(module, "_SLAB_BYTES", 24 * 24 * 128 * 5)
+    monkeypatch.setattr(module, "_SUMS_BYTES", 701 * 4 * 16)
     _, parts, _ = voxels(scenes.cornell(), 24)
     for name in whole:
         np.testing.assert_array_equal(whole[name], parts[name])
+
+
+@pytest.mark.parametrize("resolution", [16, 61, 128])
+def test_memory_is_planned_for_as_many_sheets_as_there_are(gl, resolution):
+    """The bound from triangles is never less than the sheets found, at any level, nor much more: small and thin ones, walls along
+    and across the grid, on the borders of its cells, scaled and mirrored."""
+    b = scenes.SceneBuilder()
+    white = scenes.diffuse((0.5,) * 3)
+    b.add(triangles(_thin(300, 5)), white)
+    for degrees, tilt in ((0, 0), (0, 30), (45, 0), (33, 20)):
+        b.add(_plane(degrees, tilt)[0], white, np.diag([-0.2, 0.3, 0.25, 1.0]))
+    b.quads(scenes.box_quads((-0.5, -0.5, -0.5), (0.5, 0.5, 0.5)), white)
+    s = Settings()
+    s.technique, s.samples = "VCT", 1
+    s.set("vct.resolution", resolution)
+    b.light(scenes.point_light((0, 0, 2), 10.0))
+    scene = b.build(scenes.perspective((0, -6, 0), (0, 0, 0), 0.8))
+
+    def job(g: GL):
+        renderer = Renderer(g)
+        renderer.render(scene, s, ("Diffuse Indirect",), resolution=(8, 8))
+        grid = places(renderer)[0]
+        found = [len(places(renderer, level)[1]) for level in range(grid.levels + 1)]
+        planned = sheet_counts(renderer.frame.facts)
+        renderer.close()
+        return found, planned
+
+    found, planned = shared().call(job)
+    assert all(n <= most for n, most in zip(found, planned, strict=True))
+    assert sum(planned) <= 3 * sum(found)
 
 
 def test_a_grid_that_does_not_fit_says_so_before_it_is_made(gl):

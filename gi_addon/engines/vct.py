@@ -12,7 +12,7 @@ import numpy as np
 
 from ..facts import Facts
 from ..frame import Frame
-from ..graph import Buffer, Optional, Pass, Planned, Texture, Uniform
+from ..graph import Optional, Pass, Planned, Texture, Uniform
 from ..lights import Source, spread_profile
 from ..passes.brdf_tables import BRDFTables
 from ..passes.direct_lighting import DirectLighting, TranslucentLighting
@@ -45,7 +45,17 @@ from ..passes.screen import (
 )
 from ..passes.subsurface import Subsurface, SubsurfaceBack
 from ..passes.volumetric import MEDIUM_UNIFORMS, Volumetric, medium_defines, set_medium
-from ..passes.voxels import GRID_UNIFORMS, VoxelGrid, Voxelisation, no_bodies, voxel_atlas, voxel_grid
+from ..passes.voxels import (
+    GRID_UNIFORMS,
+    STORE_GROUP,
+    Voxelisation,
+    all_sheets,
+    cell_sheets,
+    no_bodies,
+    sheet_counts,
+    store_groups,
+    voxel_grid,
+)
 from ..passes.world_guide import WorldGuide
 from ..passes.world_rays import WorldRays
 from ..settings import Settings
@@ -154,31 +164,26 @@ class RadianceInjection(Pass):
     title = "Voxel Radiance Injection"
     figure = "Voxel Radiance Injection, Voxel Anisotropic Mipmap Generation"
     reads = (
-        "voxels.sheets", "voxels.kinds", "voxels.albedo", Optional("voxels.extents", ("vct.bounce",)),
+        "voxels.sheets", "voxels.rows", "voxels.kinds", "voxels.places",
         Optional("voxels.emission"), Optional("voxels.lamps"), Optional("voxels.bodies"),
         Optional("rsm.depth"), Optional("rsm.albedo"), Optional("rsm.normal"), Optional("rsm.lights"), Optional("rsm.views"),
     )  # fmt: skip
     writes = (
-        Texture("vct.radiance", "voxel_radiance", "by side and axis: radiance × alpha, in units, that leaves the front of the "
-                "sheet; alpha, the share of the cell's face that it covers", "rgba16f", voxel_atlas,
-                mips=lambda f: voxel_grid(f).levels, filter="linear", scratch=True),
-        Texture("vct.back", "voxel_back", "radiance × alpha, W/(m²·sr), that leaves sheets by their backs; alpha, the sum of "
-                "what they cover", "rgba16f", lambda f: voxel_grid(f).size, mips=lambda f: voxel_grid(f).levels,
-                filter="linear", scratch=True),
-        Texture("vct.bounce", "voxel_bounce", "by side and axis: radiance of the later bounces, W/(m²·sr)", "rgba16f",
-                voxel_atlas, when=_one_bounce, scratch=True),
-        Texture("vct.walked", "voxel_walked", "vct.radiance after light has walked through bodies", "rgba16f", voxel_atlas,
-                when=no_bodies, scratch=True),
-        Buffer("vct.body_sheets", "body_sheets", "how many sheets light scatters below; 6 × number of the cell + part of each", "uint",
-               np.dtype("u4"), lambda f: 1 + 6 * int(np.prod(voxel_grid(f).size)), when=no_bodies, scratch=True),
-        Texture("vct.bounce_back", "voxel_bounce_back", "the same by the surfaces' backs", "rgba16f",
-                lambda f: voxel_grid(f).size, when=_one_bounce, scratch=True),
+        Texture("vct.radiance", "voxel_radiance", "by sheet: radiance × alpha, in units, that leaves its front; alpha, the share "
+                "of the cell's face that it covers", "rgba16f", all_sheets, access="readwrite", scratch=True),
+        Texture("vct.back", "voxel_back", "by cell, with its first sheet: radiance × alpha, in units, that leaves sheets by "
+                "their backs; alpha, the sum of what they cover", "rgba16f", all_sheets, access="readwrite", scratch=True),
+        Texture("vct.bounce", "voxel_bounce", "by sheet of the cells: radiance of the later bounces, in units", "rgba16f",
+                cell_sheets, when=_one_bounce, scratch=True),
+        Texture("vct.walked", "voxel_walked", "by sheet of the cells: vct.radiance after light has walked through bodies", "rgba16f",
+                cell_sheets, when=no_bodies, scratch=True),
+        Texture("vct.bounce_back", "voxel_bounce_back", "the same by the surfaces' backs, with the cell's first sheet", "rgba16f",
+                cell_sheets, when=_one_bounce, scratch=True),
     )  # fmt: skip
     uniforms = (
         *_LIGHT_UNIFORMS,
         Uniform("cone_count", "int", "cones that each cell gathers by"),
         Uniform("view_count", "int", "reflective shadow maps in the list"),
-        Uniform("first_time", "int", "1 when empty cells are due too"),
         Uniform("add_bounce", "int", "1 when later bounces are known"),
         Uniform("walk_count", "int", "walks from each sheet of a body; 0 to take over what the last ones found"),
         Uniform("walk_first", "uint", "number of the first"),
@@ -187,7 +192,6 @@ class RadianceInjection(Pass):
     )
     shaders = {
         "main": {"compute": "engines/vct/inject_comp.glsl"},
-        "body_sheets": {"compute": "engines/vct/body_sheets_comp.glsl"},
         "bodies": {"compute": "engines/vct/bodies_comp.glsl"},
         "bounce": {"compute": "engines/vct/bounce_comp.glsl"},
         "mips": {"compute": "engines/vct/mips_comp.glsl"},
@@ -203,68 +207,69 @@ class RadianceInjection(Pass):
         return {**medium_defines(facts), "WALK_LANES": LANES}
 
     def run(self, frame: Frame, planned: Planned) -> None:
-        grid = voxel_grid(planned.facts)
         program = frame.program(planned)
         values = {
-            "view_count": len(planned.facts.rig.bounce.sizes), "first_time": int(planned.stale),
-            "cone_count": planned.facts.settings.vct.cones, **_light_uniforms(planned.facts),
+            "view_count": len(planned.facts.rig.bounce.sizes), "cone_count": planned.facts.settings.vct.cones,
+            **_light_uniforms(planned.facts),
         }  # fmt: skip
         emitters = planned.facts.emitters
         brightest = float(emitters.radiance.max()) if len(emitters) else 0.0
+        if planned.stale:
+            # Not all that there is memory for is in use.
+            for texture in planned.texture_writes():
+                frame.pool.framebuffer([frame.resources[texture.name]]).clear()
         again = planned.facts.settings.bounces - 1 if planned.has("vct.bounce") else 0
         for k in range(again + 1):
             if k:
-                self._bounce(frame, planned, grid, values)
+                self._bounce(frame, planned, values)
                 frame.resources["vct.bounce"].use(12)
                 frame.resources["vct.bounce_back"].use(13)
             frame.set(program, add_bounce=int(k > 0), emission_scale=brightest / values["radiance_unit"], **values)
             set_medium(frame, program, planned.facts)
-            frame.compute(planned, program, grid.size, (4, 4, 4))
+            _each_sheet(frame, planned, program, 0)
             if planned.has("voxels.bodies"):
-                self._walk(frame, planned, grid, {**values, "emission_scale": brightest / values["radiance_unit"]})
-            build_mips(frame, planned, grid)
+                self._walk(frame, planned, {**values, "emission_scale": brightest / values["radiance_unit"]})
+            build_mips(frame, planned)
 
-    def _walk(self, frame: Frame, planned: Planned, grid: VoxelGrid, values: dict) -> None:
+    def _walk(self, frame: Frame, planned: Planned, values: dict) -> None:
         """Replace what sheets of bodies reflect by what leaves them after it has walked below the surface."""
         program = frame.program(planned, "bodies")
         moves = self.rate(planned.facts) == "subframe"
         # A still light's walks are all taken at once; one that moves takes others in each sub-frame.
         count = max(-(-WALKS // planned.facts.subframes), LANES) if moves else WALKS
-        frame.resources["vct.body_sheets"].clear()
-        sheets = frame.program(planned, "body_sheets")
-        frame.set(sheets, **values)
-        frame.compute(planned, sheets, grid.size, (4, 4, 4))
         for walks, light in ((count, "vct.radiance"), (0, "vct.walked")):
             frame.resources[light].use(12)
             frame.set(program, walk_count=walks, walk_first=count * frame.subframe if moves else 0, **values)
             frame.compute(planned, program, (_WALKERS,), (1,))
 
     @staticmethod
-    def _bounce(frame: Frame, planned: Planned, grid: VoxelGrid, values: dict) -> None:
+    def _bounce(frame: Frame, planned: Planned, values: dict) -> None:
         """Gather what the voxels hold into vct.bounce."""
         program = frame.program(planned, "bounce")
         frame.resources["vct.radiance"].use(12)
         frame.resources["vct.back"].use(13)
         frame.set(program, **values)
-        frame.compute(planned, program, grid.size, (4, 4, 4))
+        _each_sheet(frame, planned, program, 0)
 
 
-def build_mips(frame: Frame, planned: Planned, grid: VoxelGrid) -> None:
-    """The levels of the light volumes above their cells."""
+def _each_sheet(frame: Frame, planned: Planned, program, level: int) -> None:
+    """Run a compute program for each sheet of a level."""
+    columns, rows = store_groups(sheet_counts(planned.facts)[level])
+    frame.compute(planned, program, (columns * STORE_GROUP, rows), (STORE_GROUP, 1))
+
+
+def build_mips(frame: Frame, planned: Planned) -> None:
+    """The levels of light above the cells."""
     program = frame.program(planned, "mips")
-    size = grid.size
-    for level in range(grid.levels):
-        size = tuple(n // 2 for n in size)
-        for k, name in enumerate(("vct.radiance", "vct.back")):
-            frame.resources[name].bind_to_image(4 + 2 * k, read=True, write=False, level=level)
-            frame.resources[name].bind_to_image(5 + 2 * k, read=False, write=True, level=level + 1)
-        frame.set(program, coarse_size=size, coarse_level=level + 1, first_time=int(planned.stale))
-        program.run(*(-(-n // 4) for n in size))
-        frame.gl.ctx.memory_barrier()
+    grid = voxel_grid(planned.facts)
+    frame.set(program, **grid.uniforms())
+    for level in range(1, grid.levels + 1):
+        frame.set(program, coarse_level=level)
+        _each_sheet(frame, planned, program, level)
 
 
 # What cones read.
-_VOLUMES = ("vct.radiance", "vct.back", "voxels.sheets", "voxels.extents", "voxels.kinds")
+_VOLUMES = ("vct.radiance", "vct.back", "voxels.sheets", "voxels.rows", "voxels.kinds")
 _CONE_UNIFORMS = (
     *_LIGHT_UNIFORMS,
     Uniform("cone_count", "int", "cones per point and sub-frame"),
@@ -376,7 +381,7 @@ class GlossyCones(ScreenPass):
 
     title = "Voxel Glossy Reflections"
     figure = "Voxel Lighting Computation"
-    reads = (*_VOLUMES, "voxels.albedo", "gbuffer.depth", "gbuffer.normal", *LOBE)
+    reads = (*_VOLUMES, "gbuffer.depth", "gbuffer.normal", *LOBE)
     writes = (GLOSSY_TRACED, GLOSSY_RAY)
     uniforms = _CONE_UNIFORMS
     fragment = "engines/vct/glossy_frag.glsl"
@@ -418,7 +423,7 @@ class RefractionCones(ScreenPass):
 
     title = "Voxel Translucency"
     figure = "Voxel Lighting Computation"
-    reads = (*_VOLUMES, "voxels.albedo", *REFRACTING)
+    reads = (*_VOLUMES, *REFRACTING)
     writes = (TRANSMISSION_INDIRECT,)
     uniforms = _CONE_UNIFORMS
     fragment = "engines/vct/refraction_frag.glsl"

@@ -1,11 +1,15 @@
-// One column of cells under a triangle: clips the triangle to each cell and adds its area there, and its material by that
-// area, to the cell's sums. The sums are integers: the order does not matter.
+// One column of cells under a triangle: clips the triangle to each cell and, with VOXEL_MARK, notes that it has such a sheet; else
+// adds its area there, and its material by that area, to the sheet's and the cell's sums. They are integers: the order does not
+// matter.
 
 #include "surface/surface_point.glsl"
-#include "passes/voxel_extent.glsl"
+#include "passes/voxel_sums.glsl"
 #if VOXEL_BODIES
 #include "lib/body_lib.glsl"
 #endif
+
+layout(binding = 4, r32ui) uniform uimage3D cells_now;
+layout(binding = 6, r32ui) readonly uniform uimage2D rows_now;
 
 flat in vec3 triangle_a;
 flat in vec3 triangle_b;
@@ -157,67 +161,77 @@ void main()
         clip_polygon(part, corners, vec4(0.0, 0.0, -1.0, layer + 1.0));
         vec3 turned_cell = vec3(column, layer);
         ivec3 cell = ivec3(triangle_axis == 0 ? turned_cell.zxy : triangle_axis == 1 ? turned_cell.yzx : turned_cell);
-        if (corners == 0 || any(lessThan(cell, ivec3(0))) || any(greaterThanEqual(cell, grid_size)) ||
-            cell.z < slab.x || cell.z >= slab.x + slab.y) {
+        if (corners == 0 || any(lessThan(cell, ivec3(0))) || any(greaterThanEqual(cell, grid_size))) {
             continue;
         }
         float seen = seen_area(part, corners);
         // A cell that is only touched is still taken: one unit.
         float weight = max(round(seen / along * float(VOXEL_UNITS)), 1.0);
-        uint at = uint(((cell.z - slab.x) * grid_size.y + cell.y) * grid_size.x + cell.x) * uint(VOXEL_WORDS);
-        add(at, weight);
-        add(at + 1u, weight * opacity);
-        add(at + 2u, weight * albedo.r);
-        add(at + 3u, weight * albedo.g);
-        add(at + 4u, weight * albedo.b);
-        add(at + 32u, weight * diffuse);
-        // The plane as a height over the cell's middle: along the axis, x + slope · (u, v) = height.
         vec3 across = triangle_axis == 0 ? front.yzx : triangle_axis == 1 ? front.zxy : front;
+        int side = across.z < 0.0 ? 1 : 0;
+#if VOXEL_MARK
+        imageAtomicOr(cells_now, cell, 1u << (2 * triangle_axis + side) | (round(weight * opacity) > 0.0 ? SOME_OPAQUE : 0u));
+#else
+        uint word = imageLoad(cells_now, cell).r;
+        uint kinds = word_kinds(word);
+        uint number = imageLoad(rows_now, store_texel(row_of(cell, grid_size, 0))).r + word_sheets(word);
+        uint own = number + sheets_before(kinds, 2 * triangle_axis + side);
+        if (kinds >= 64u || own < chunk.x || own >= chunk.x + chunk.y) {
+            continue;
+        }
+        if (number >= chunk.x) {
+            uint at = (number - chunk.x) * uint(VOXEL_WORDS);
+            add(at + SUM_AREA, weight);
+            add(at + SUM_OPAQUE, weight * opacity);
+            add(at + SUM_ALBEDO, weight * albedo.r);
+            add(at + SUM_ALBEDO + 1u, weight * albedo.g);
+            add(at + SUM_ALBEDO + 2u, weight * albedo.b);
+            add(at + SUM_DIFFUSE, weight * diffuse);
+#if VOXEL_EMISSION
+            float scale = weight / (float(VOXEL_UNITS) * emission_unit);
+            add(at + SUM_EMISSION, c.emission.r * scale);
+            add(at + SUM_EMISSION + 1u, c.emission.g * scale);
+            add(at + SUM_EMISSION + 2u, c.emission.b * scale);
+#endif
+        }
+        // The plane as a height over the cell's middle: along the axis, x + slope · (u, v) = height.
+        uint at = (own - chunk.x) * uint(VOXEL_WORDS);
         vec2 slope = across.xy / across.z;
         float height = triangle_a.z - layer - 0.5 + dot(slope, triangle_a.xy - column - 0.5);
         // A part so small that sums round is still a plane: to a thousandth.
         float share = max(round(seen * float(VOXEL_UNITS) * opacity), 1024.0);
-        int side = across.z < 0.0 ? 1 : 0;
-        uint sheet = at + 5u + 4u * uint(2 * triangle_axis + side);
-        add(sheet, share);
-        add(sheet + 1u, share * slope.x);
-        add(sheet + 2u, share * slope.y);
-        add(sheet + 3u, share * clamp(height, -1.5, 1.5));
+        add(at + SUM_SHARE, share);
+        add(at + SUM_PLANE, share * slope.x);
+        add(at + SUM_PLANE + 1u, share * slope.y);
+        add(at + SUM_PLANE + 2u, share * clamp(height, -1.5, 1.5));
         // What of the face lies within: the largest of its ends, either way from the cell's sides, and of no more than rounds.
         vec4 extent = covered_extent(part, corners, column);
         for (int i = 0; i < 4; ++i) {
-            atomicMax(voxel_sums[sheet_extent(at, 2 * triangle_axis + side) + uint(i)], uint(ceil(extent[i] * EXTENT_UNITS)));
+            atomicMax(voxel_sums[at + SUM_EXTENT + uint(i)], uint(ceil(extent[i] * EXTENT_UNITS)));
         }
-        atomicOr(voxel_sums[at + 29u + uint(triangle_axis)], squares_covered(part, corners, column) << (16 * side));
-#if VOXEL_EMISSION
-        float scale = weight / (float(VOXEL_UNITS) * emission_unit);
-        add(at + 57u, c.emission.r * scale);
-        add(at + 58u, c.emission.g * scale);
-        add(at + 59u, c.emission.b * scale);
-#elif VOXEL_LAMPS
+        atomicOr(voxel_sums[at + SUM_SQUARES], squares_covered(part, corners, column));
+#if VOXEL_LAMPS
         if (max3(c.emission) > 0.0) {
-            add(at + 57u + uint(2 * triangle_axis + side), seen * float(VOXEL_UNITS));
+            add(at + SUM_LAMPS, seen * float(VOXEL_UNITS));
         }
 #endif
 #if VOXEL_BODIES
         float scattered = luminance(c.subsurface);
         if (scattered > 0.0) {
-            uint body = at + uint(BODY_WORD);
-            float amount = max(weight, 1024.0);
-            // Through what is longer than the grid light goes straight.
+            uint body = at + uint(SUM_BODY);
             vec3 path = min(c.subsurface_radius / (scattered * grid_cell), vec3(LONGEST_PATH)) / LONGEST_PATH;
             vec3 entry = c.subsurface_entry / scattered;
-            vec3 own = saturate(c.diffuse * (entry.z / max(luminance(c.diffuse), 1e-6))); // without what layers above take
-            add(body, amount);
+            vec3 own_albedo = saturate(c.diffuse * (entry.z / max(luminance(c.diffuse), 1e-6))); // without what layers above take
+            add(body, share);
             for (int i = 0; i < 3; ++i) {
-                add(body + 1u + uint(i), amount * path[i]);
-                add(body + 5u + uint(i), amount * own[i]);
+                add(body + 1u + uint(i), share * path[i]);
+                add(body + 5u + uint(i), share * own_albedo[i]);
             }
-            add(body + 4u, amount * min(scattered / max(luminance(albedo), 1e-6), 1.0));
-            add(body + 8u, amount * saturate(entry.x));
-            add(body + 9u, amount / max(entry.y, 1.0));
-            atomicOr(voxel_sums[body + 10u], 1u << uint(2 * triangle_axis + side));
+            add(body + 4u, share * min(scattered / max(luminance(albedo), 1e-6), 1.0));
+            add(body + 8u, share * saturate(entry.x));
+            add(body + 9u, share / max(entry.y, 1.0));
         }
+#endif
 #endif
     }
 }

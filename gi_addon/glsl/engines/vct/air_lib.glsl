@@ -14,5 +14,5 @@ float voxel_visibility(Light light, vec3 position_ws)
     float angle;
     light_arriving(light, position_ws, l, angle);
     float reach = light_is_directional(light) ? 1e30 : distance(light.position_ws, position_ws) / grid.cell - LIFT;
-    return trace_open(voxel_sheets, voxel_extents, voxel_kinds, grid, Cone(start, l, 0.0, reach, 0.0));
+    return trace_open(voxel_sheets, voxel_rows, voxel_kinds, grid, Cone(start, l, 0.0, reach, 0.0));
 }

@@ -25,7 +25,7 @@ void main()
     for (int i = 0; i < cone_count; ++i) {
         cone.direction = frame * cone_direction(run + uint(i));
         if (dot(cone.direction, ng) > 0.0) {
-            open_ += trace_open(voxel_sheets, voxel_extents, voxel_kinds, grid, cone);
+            open_ += trace_open(voxel_sheets, voxel_rows, voxel_kinds, grid, cone);
         }
     }
     ao = vec2(open_ / float(cone_count), 1.0);

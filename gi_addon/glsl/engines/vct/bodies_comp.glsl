@@ -10,17 +10,17 @@
 #include "engines/vct/walk_lib.glsl"
 
 layout(local_size_x = WALK_LANES) in;
-layout(binding = 12) uniform sampler3D light_now; // vct.radiance, or vct.walked when that is due
+layout(binding = 12) uniform sampler2D light_now; // vct.radiance, or vct.walked when that is due
 
 shared vec3 found_by[WALK_LANES];
 
 // Radiance that a sheet reflects, in units.
-vec3 reflected(ivec3 cell, int part)
+vec3 reflected(uint number)
 {
-    vec4 light = texelFetch(light_now, part_texel(cell, grid_size, part >> 1, part & 1), 0);
+    vec4 light = texelFetch(light_now, store_texel(number), 0);
     vec3 radiance = light.a > 0.0 ? light.rgb / light.a : vec3(0.0);
 #if HAS_VOXEL_EMISSION
-    radiance -= texelFetch(voxel_emission, cell, 0).rgb * emission_scale;
+    radiance -= texelFetch(voxel_emission, store_texel(number), 0).rgb * emission_scale;
 #endif
     return radiance;
 }
@@ -37,14 +37,14 @@ int covered_square(Sheet sheet, int which)
     return square;
 }
 
-// What one walk from a sheet finds.
-vec3 walked(ivec3 cell, int part, Body body, vec3 own, int number)
+// What walk `which` from a sheet finds.
+vec3 walked(uint number, ivec3 cell, int part, Body body, vec3 own, int which)
 {
-    uint index = walk_first + uint(number);
-    uint seed = hash_u32(uvec3(part_texel(cell, grid_size, part >> 1, part & 1)));
+    uint index = walk_first + uint(which);
+    uint seed = hash_u32(pack_place(cell, part));
     uint state = hash_u32(uvec2(seed, index));
     bool together = max3(body.path) - min3(body.path) <= 1e-3 * max3(body.path);
-    int channel = number % 3;
+    int channel = which % 3;
     vec3 taken = vec3(1.0);
     if (!together) {
         // A third of the walks is a channel's, or one more.
@@ -54,42 +54,43 @@ vec3 walked(ivec3 cell, int part, Body body, vec3 own, int number)
     if (path < WALK_SHORT) {
         return taken * own;
     }
-    Sheet sheet = sheet_at(voxel_sheets, cell, grid_size, part);
+    Sheet sheet = sheet_at(voxel_sheets, number, part);
     int square = covered_square(sheet, int(index) % bitCount(sheet.squares));
     vec2 uv = square_middle(square) + 0.25 * (vec2(draw(state), draw(state)) - 0.5);
     vec3 start = vec3(cell) + 0.5 + sheet_point(sheet, part, uv);
     vec3 direction = way_in(body, frame_from_normal(sheet_normal(sheet, part)), fract(r2_sequence(index) + unit_shift(seed)), state);
     Grid grid = Grid(grid_low, grid_cell, vec3(grid_size), grid_levels);
     vec3 alpha = single_scattering_albedo(max(body.albedo, vec3(1e-3)));
-    Walk walk = walk_below(voxel_sheets, voxel_kinds, voxel_bodies, grid, start, direction, path, alpha, state);
+    Walk walk = walk_below(voxel_sheets, voxel_rows, voxel_kinds, voxel_bodies, grid, start, direction, path, alpha, state);
     if (max3(walk.weight) <= 0.0) {
         return vec3(0.0);
     }
-    vec3 there = max(unpack_body(texelFetch(voxel_bodies, walk.cell, 0)).albedo, vec3(1e-3));
-    return taken * walk.weight * reflected(walk.cell, walk.part) / there;
+    vec3 there = max(unpack_body(texelFetch(voxel_bodies, store_texel(walk.number), 0)).albedo, vec3(1e-3));
+    return taken * walk.weight * reflected(walk.number) / there;
 }
 
 void main()
 {
     uint lane = gl_LocalInvocationID.x;
-    uint count = body_sheets[0];
-    for (uint k = gl_WorkGroupID.x; k < count; k += gl_NumWorkGroups.x) {
-        uint entry = body_sheets[1u + k];
-        int part = int(entry % 6u);
-        int number = int(entry / 6u);
-        ivec3 cell = ivec3(number % grid_size.x, number / grid_size.x % grid_size.y, number / (grid_size.x * grid_size.y));
-        ivec3 texel = part_texel(cell, grid_size, part >> 1, part & 1);
+    // Sheets of the cells: as many as before the first row of the next level.
+    uint count = texelFetch(voxel_rows, store_texel(rows_before(grid_size, 1)), 0).r;
+    for (uint number = gl_WorkGroupID.x; number < count; number += gl_NumWorkGroups.x) {
+        Body body = unpack_body(texelFetch(voxel_bodies, store_texel(number), 0));
+        if (body.share <= 0.0) {
+            continue;
+        }
+        ivec2 texel = store_texel(number);
         if (walk_count == 0) {
             if (lane == 0u) {
                 imageStore(voxel_radiance, texel, texelFetch(light_now, texel, 0));
             }
             continue;
         }
-        Body body = unpack_body(texelFetch(voxel_bodies, cell, 0));
-        vec3 own = reflected(cell, part);
+        uint place = texelFetch(voxel_places, texel, 0).r;
+        vec3 own = reflected(number);
         vec3 sum = vec3(0.0);
         for (int i = int(lane); i < walk_count; i += WALK_LANES) {
-            sum += walked(cell, part, body, own, i);
+            sum += walked(number, place_cell(place), place_part(place), body, own, i);
         }
         found_by[lane] = sum;
         barrier();

@@ -4,9 +4,9 @@
 #include "lib/sequence_lib.glsl"
 #include "engines/vct/cone_lib.glsl"
 
-layout(local_size_x = 4, local_size_y = 4, local_size_z = 4) in;
-layout(binding = 12) uniform sampler3D light_now;
-layout(binding = 13) uniform sampler3D back_now;
+layout(local_size_x = 64) in;
+layout(binding = 12) uniform sampler2D light_now;
+layout(binding = 13) uniform sampler2D back_now;
 
 // E/π, in units, at a point of a sheet with normal `n`: N cones of equal weight, as in diffuse_lib.glsl, turned from sheet to sheet.
 vec3 gathered(Grid grid, vec3 p, vec3 n, float leaving, uint turn)
@@ -17,30 +17,27 @@ vec3 gathered(Grid grid, vec3 p, vec3 n, float leaving, uint turn)
     for (int i = 0; i < cone_count; ++i) {
         vec3 d = frame * cone_direction(turn + uint(i));
         Cone cone = Cone(p + LIFT * n, d, spread, 1e30, leaving);
-        sum += trace_cone(light_now, back_now, voxel_sheets, voxel_extents, voxel_kinds, grid, cone).radiance;
+        sum += trace_cone(light_now, back_now, voxel_sheets, voxel_rows, voxel_kinds, grid, cone).radiance;
     }
     return sum / (float(cone_count) * radiance_unit);
 }
 
 void main()
 {
-    ivec3 cell = ivec3(gl_GlobalInvocationID);
-    if (any(greaterThanEqual(cell, grid_size))) {
+    uint number = invoked_number();
+    ivec3 cell;
+    uint kinds;
+    if (!first_of_cell(voxel_places, voxel_rows, voxel_kinds, grid_size, 0, number, cell, kinds)) {
         return;
     }
-    uint kinds = kinds_of(texelFetch(voxel_kinds, cell, 0));
-    bool empty = kinds >= 64u;
-    if (empty && first_time == 0) {
-        return;
-    }
-    vec3 albedo = texelFetch(voxel_albedo, cell, 0).rgb;
+    vec3 albedo = sheet_albedo(voxel_sheets, number).rgb;
     Grid grid = Grid(grid_low, grid_cell, vec3(grid_size), grid_levels);
     uint turn = hash_u32(uvec3(cell));
     vec4 backs = vec4(0.0);
+    uint own = number;
     for (int part = 0; part < 6; ++part) {
-        vec3 front = vec3(0.0);
-        if (!empty && (kinds >> part & 1u) == 1u) {
-            Sheet sheet = sheet_at(voxel_sheets, cell, grid_size, part);
+        if ((kinds >> part & 1u) == 1u) {
+            Sheet sheet = sheet_at(voxel_sheets, own, part);
             vec3 n = sheet_normal(sheet, part);
             vec2 middle = vec2(0.0);
             for (int square = 0; square < 16; ++square) {
@@ -48,10 +45,11 @@ void main()
             }
             float share = squares_share(sheet.squares);
             vec3 p = vec3(cell) + 0.5 + sheet_point(sheet, part, middle / (16.0 * share));
-            front = albedo * gathered(grid, p, n, 1.0, turn);
+            vec3 front = albedo * gathered(grid, p, n, 1.0, turn);
+            imageStore(voxel_bounce, store_texel(own), vec4(front, 1.0));
+            ++own;
             backs += vec4(albedo * gathered(grid, p, -n, -1.0, turn), 1.0) * share;
         }
-        imageStore(voxel_bounce, part_texel(cell, grid_size, part >> 1, part & 1), vec4(front, 1.0));
     }
-    imageStore(voxel_bounce_back, cell, backs.a > 0.0 ? backs / backs.a : vec4(0.0));
+    imageStore(voxel_bounce_back, store_texel(number), backs.a > 0.0 ? backs / backs.a : vec4(0.0));
 }

@@ -20,9 +20,10 @@ struct Meeting {
     ivec3 cell;
     vec3 normal;    // of the side that is met
     float opacity;
+    uint number;    // of the sheet
 };
 
-const Meeting NOTHING_MET = Meeting(1e30, 0, true, ivec3(0), vec3(0.0), 0.0);
+const Meeting NOTHING_MET = Meeting(1e30, 0, true, ivec3(0), vec3(0.0), 0.0, 0u);
 
 struct ConeResult {
     vec3 radiance;        // that arrives along the cone, W/(m²·sr)
@@ -65,15 +66,17 @@ vec3 cone_direction(uint j)
 }
 
 // Which side of a surface in the grid a point on it with normal `n` lies on, by the sheet of its own cell.
-float surface_side(sampler3D sheets, sampler3D kinds, Grid grid, vec3 p, vec3 n)
+float surface_side(usampler2D sheets, usampler2D rows, sampler3D kinds, Grid grid, vec3 p, vec3 n)
 {
     ivec3 size = ivec3(grid.size);
     ivec3 cell = clamp(ivec3(floor(p - LIFT * n)), ivec3(0), size - 1);
-    uint found = kinds_of(texelFetch(kinds, cell, 0));
+    vec4 texel = texelFetch(kinds, cell, 0);
+    uint found = kinds_of(texel);
+    uint number = found < 64u ? first_number(rows, texel, cell, size, 0) : 0u;
     float side = 0.0;
     for (int part = 0; part < 6; ++part) {
         if (found < 64u && (found >> part & 1u) == 1u) {
-            Sheet sheet = sheet_at(sheets, cell, size, part);
+            Sheet sheet = sheet_at(sheets, number++, part);
             float facing = dot(sheet_normal(sheet, part), n);
             float height = dot(sheet.slant, p - vec3(cell) - 0.5) - sheet.height;
             if (abs(height) <= OWN_HEIGHT && abs(facing) > 0.5) {
@@ -102,14 +105,10 @@ float cone_begin(Cone cone, Grid grid)
 
 // Whether a sheet reaches as far as (u, v), in cells from the cell's middle: to the seam, since by so much may the planes of
 // neighbouring cells be apart.
-bool reaches(sampler3D extents, ivec3 cell, ivec3 size, int part, vec2 uv)
-{
-    vec4 far = texelFetch(extents, part_texel(cell, size, part >> 1, part & 1), 0) + SEAM;
-    return all(lessThanEqual(vec4(0.5 - uv, 0.5 + uv), far));
-}
+bool reaches(Sheet sheet, vec2 uv) { return all(lessThanEqual(vec4(0.5 - uv, 0.5 + uv), sheet.far + SEAM)); }
 
-// The first sheet in a cell that the ray meets between `t` and `t_out`.
-Meeting first_sheet(sampler3D sheets, sampler3D extents, Cone cone, ivec3 cell, ivec3 size, uint kinds, float t, float t_out)
+// The first sheet in a cell, whose own start at `number`, that the ray meets between `t` and `t_out`.
+Meeting first_sheet(usampler2D sheets, Cone cone, ivec3 cell, uint number, uint kinds, float t, float t_out)
 {
     Meeting first = NOTHING_MET;
     vec3 from = cone.start - vec3(cell) - 0.5;
@@ -117,7 +116,8 @@ Meeting first_sheet(sampler3D sheets, sampler3D extents, Cone cone, ivec3 cell, 
         if ((kinds >> part & 1u) == 0u) {
             continue;
         }
-        Sheet sheet = sheet_at(sheets, cell, size, part);
+        uint own = number++;
+        Sheet sheet = sheet_at(sheets, own, part);
         float sign_ = (part & 1) == 0 ? 1.0 : -1.0;
         // Height over the front, along the axis: at the start, per length, where the ray enters and where it leaves.
         float height = sign_ * (dot(sheet.slant, from) - sheet.height);
@@ -136,8 +136,8 @@ Meeting first_sheet(sampler3D sheets, sampler3D extents, Cone cone, ivec3 cell, 
         float at = clamp(-height / (abs(rise) > 1e-9 ? rise : 1e-9), t, t_out);
         vec2 uv = across_axis(from + cone.direction * at, part >> 1);
         ivec2 square = clamp(ivec2(floor((uv + 0.5) * 4.0)), ivec2(0), ivec2(3));
-        if (at < first.t && (sheet.squares >> (square.x + 4 * square.y) & 1u) == 1u && reaches(extents, cell, size, part, uv)) {
-            first = Meeting(at, part, front, cell, normalize(sheet.slant) * (front ? sign_ : -sign_), 0.0);
+        if (at < first.t && (sheet.squares >> (square.x + 4 * square.y) & 1u) == 1u && reaches(sheet, uv)) {
+            first = Meeting(at, part, front, cell, normalize(sheet.slant) * (front ? sign_ : -sign_), 0.0, own);
         }
     }
     return first;
@@ -145,18 +145,18 @@ Meeting first_sheet(sampler3D sheets, sampler3D extents, Cone cone, ivec3 cell, 
 
 // Light that leaves a sheet towards the cone, over the cone's footprint there: filtered across the sheet, but not along its axis,
 // where other surfaces face the same way before and behind it.
-vec3 leaving_light(sampler3D atlas, sampler3D back, Grid grid, Cone cone, Meeting met)
+vec3 leaving_light(sampler2D atlas, sampler2D back, usampler2D rows, sampler3D kinds, Grid grid, Cone cone, Meeting met)
 {
-    float lod = clamp(floor(log2(max(cone.spread * met.t, 1.0))), 0.0, grid.levels);
+    int level = int(clamp(floor(log2(max(cone.spread * met.t, 1.0))), 0.0, grid.levels));
     vec3 p = cone.start + cone.direction * met.t;
-    vec3 layer = (floor(vec3(met.cell) * exp2(-lod)) + 0.5) * exp2(lod);
-    vec3 uvw = mix(p, layer, equal(ivec3(met.part >> 1), ivec3(0, 1, 2))) / grid.size;
-    vec4 light = met.front ? part_at(atlas, grid, uvw, lod, met.part) : textureLod(back, uvw, lod);
+    int within = met.cell[met.part >> 1] >> level;
+    vec4 light = met.front ? light_at(atlas, rows, kinds, grid, level, p, within, met.part, true)
+                           : light_at(back, rows, kinds, grid, level, p, within, met.part, false);
     return light.a > 0.0 ? light.rgb * (radiance_unit / light.a) : vec3(0.0);
 }
 
 // The next sheet on the ray's way from `t` to `end`; `t` ends behind its cell.
-Meeting next_sheet(sampler3D sheets, sampler3D extents, sampler3D kinds, Grid grid, Cone cone, float end, inout float t)
+Meeting next_sheet(usampler2D sheets, usampler2D rows, sampler3D kinds, Grid grid, Cone cone, float end, inout float t)
 {
     vec3 d = mix(cone.direction, vec3(1e-6), lessThan(abs(cone.direction), vec3(1e-6)));
     vec3 inverse = 1.0 / d;
@@ -175,7 +175,7 @@ Meeting next_sheet(sampler3D sheets, sampler3D extents, sampler3D kinds, Grid gr
         vec3 out_at = (floor(p / width) * width + forward * width - p) * inverse;
         float t_out = t + max(min(out_at.x, min(out_at.y, out_at.z)), 0.0);
         if (found < 64u) {
-            met = first_sheet(sheets, extents, cone, cell, size, found, t, min(t_out, end));
+            met = first_sheet(sheets, cone, cell, first_number(rows, texel, cell, size, 0), found, t, min(t_out, end));
             met.opacity = met.t < end ? texel.g : 0.0;
         }
         t = t_out + 1e-3;
@@ -183,7 +183,7 @@ Meeting next_sheet(sampler3D sheets, sampler3D extents, sampler3D kinds, Grid gr
     return met;
 }
 
-ConeResult trace_cone(sampler3D atlas, sampler3D back, sampler3D sheets, sampler3D extents, sampler3D kinds, Grid grid, Cone cone)
+ConeResult trace_cone(sampler2D atlas, sampler2D back, usampler2D sheets, usampler2D rows, sampler3D kinds, Grid grid, Cone cone)
 {
     ConeResult result = ConeResult(vec3(0.0), 1.0, NOTHING_MET);
     float end = cone_end(cone, grid);
@@ -192,9 +192,9 @@ ConeResult trace_cone(sampler3D atlas, sampler3D back, sampler3D sheets, sampler
         if (t >= end || result.transmittance < CONE_END) {
             break;
         }
-        Meeting met = next_sheet(sheets, extents, kinds, grid, cone, end, t);
+        Meeting met = next_sheet(sheets, rows, kinds, grid, cone, end, t);
         if (met.t < end) {
-            result.radiance += result.transmittance * met.opacity * leaving_light(atlas, back, grid, cone, met);
+            result.radiance += result.transmittance * met.opacity * leaving_light(atlas, back, rows, kinds, grid, cone, met);
             result.transmittance *= 1.0 - met.opacity;
             result.first = layer == 0 ? met : result.first;
         }
@@ -203,7 +203,7 @@ ConeResult trace_cone(sampler3D atlas, sampler3D back, sampler3D sheets, sampler
 }
 
 // The same without light: what of the cone is open.
-float trace_open(sampler3D sheets, sampler3D extents, sampler3D kinds, Grid grid, Cone cone)
+float trace_open(usampler2D sheets, usampler2D rows, sampler3D kinds, Grid grid, Cone cone)
 {
     float transmittance = 1.0;
     float end = cone_end(cone, grid);
@@ -212,7 +212,7 @@ float trace_open(sampler3D sheets, sampler3D extents, sampler3D kinds, Grid grid
         if (t >= end || transmittance < CONE_END) {
             break;
         }
-        transmittance *= 1.0 - next_sheet(sheets, extents, kinds, grid, cone, end, t).opacity;
+        transmittance *= 1.0 - next_sheet(sheets, rows, kinds, grid, cone, end, t).opacity;
     }
     return transmittance;
 }

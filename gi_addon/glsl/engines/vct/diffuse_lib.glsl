@@ -18,7 +18,7 @@ struct Gathered {
 Cone surface_cone(Grid grid, vec3 position_ws, vec3 ng, vec3 direction, float spread, float reach)
 {
     vec3 p = (position_ws - grid.low) / grid.cell;
-    return Cone(p + LIFT * ng, direction, spread, reach / grid.cell, surface_side(voxel_sheets, voxel_kinds, grid, p, ng));
+    return Cone(p + LIFT * ng, direction, spread, reach / grid.cell, surface_side(voxel_sheets, voxel_rows, voxel_kinds, grid, p, ng));
 }
 
 // Points side by side have runs of cones one after another: every SIDE × SIDE of them all runs of one fine set.
@@ -52,7 +52,7 @@ Gathered gather_cones(ivec2 place, vec3 position_ws, vec3 n, vec3 ng)
         if (dot(cone.direction, ng) <= 0.0) {
             continue; // into the triangle
         }
-        ConeResult result = trace_cone(voxel_radiance, voxel_back, voxel_sheets, voxel_extents, voxel_kinds, grid, cone);
+        ConeResult result = trace_cone(voxel_radiance, voxel_back, voxel_sheets, voxel_rows, voxel_kinds, grid, cone);
         g.radiance += result.radiance / float(cone_count);
         g.direction += directional(cone.direction, n, result.radiance);
     }

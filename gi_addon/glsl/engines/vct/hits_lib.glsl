@@ -61,7 +61,7 @@ void trace_hits(vec3 position_ws, vec3 n, vec3 ng, uint run, out uvec4 hits[CONE
         cone.direction = frame * cone_direction(run + uint(i));
         hits[i] = uvec4(0u);
         if (dot(cone.direction, ng) > 0.0) { // else into the triangle
-            ConeResult result = trace_cone(voxel_radiance, voxel_back, voxel_sheets, voxel_extents, voxel_kinds, grid, cone);
+            ConeResult result = trace_cone(voxel_radiance, voxel_back, voxel_sheets, voxel_rows, voxel_kinds, grid, cone);
             bool met = result.first.t < 1e30;
             float t = max(met ? result.first.t : cone_end(cone, grid), LIFT);
             vec3 normal = met ? result.first.normal : box_normal(cone, grid);

@@ -13,11 +13,11 @@
 #include "engines/rsm/rsm_lib.glsl"
 #endif
 
-layout(local_size_x = 4, local_size_y = 4, local_size_z = 4) in;
+layout(local_size_x = 64) in;
 
 #if HAS_VOXEL_BOUNCE
-layout(binding = 12) uniform sampler3D bounce_now;
-layout(binding = 13) uniform sampler3D bounce_back_now;
+layout(binding = 12) uniform sampler2D bounce_now;
+layout(binding = 13) uniform sampler2D bounce_back_now;
 #endif
 
 #if HAS_RSM_DEPTH
@@ -107,40 +107,54 @@ bool outside_view(LightView v, vec3 center)
 }
 #endif
 
+#if HAS_VOXEL_LAMPS
+// The share of a cell's face along `axis` that lamps cover. A lamp with two sides covers what one of them does.
+float lamps_cover(ivec3 cell, int axis)
+{
+    vec4 texel = texelFetch(voxel_kinds, cell, 0);
+    uint kinds = kinds_of(texel);
+    float covered = 0.0;
+    for (int part = 2 * axis; part < 2 * axis + 2; ++part) {
+        if (kinds < 64u && (kinds >> part & 1u) == 1u) {
+            uint number = first_number(voxel_rows, texel, cell, grid_size, 0) + sheets_before(kinds, part);
+            covered = max(covered, texelFetch(voxel_lamps, store_texel(number), 0).r);
+        }
+    }
+    return covered;
+}
+#endif
+
 // Where half floats end. The unit keeps light below (engines/vct.py: radiance_unit) but for what lies nearer to a lamp than a
 // quarter of a cell: that is as bright as what lies there.
 const float HALF_END = 65504.0;
 
 void main()
 {
-    ivec3 cell = ivec3(gl_GlobalInvocationID);
-    if (any(greaterThanEqual(cell, grid_size))) {
+    uint number = invoked_number();
+    ivec3 cell;
+    uint kinds;
+    if (!first_of_cell(voxel_places, voxel_rows, voxel_kinds, grid_size, 0, number, cell, kinds)) {
         return;
-    }
-    uint kinds = kinds_of(texelFetch(voxel_kinds, cell, 0));
-    bool empty = kinds >= 64u;
-    if (empty && first_time == 0) {
-        return; // as it was
     }
     vec3 emission = vec3(0.0);
 #if HAS_VOXEL_EMISSION
-    emission = texelFetch(voxel_emission, cell, 0).rgb * emission_scale; // by both sides of a surface
+    emission = texelFetch(voxel_emission, store_texel(number), 0).rgb * emission_scale; // by both sides of a surface
 #endif
     vec3 center = grid_low + (vec3(cell) + 0.5) * grid_cell;
     vec4 backs = vec4(0.0);
+    uint own = number;
     for (int part = 0; part < 6; ++part) {
-        vec4 fronts = vec4(0.0);
-        if (!empty && (kinds >> part & 1u) == 1u) {
-            Sheet sheet = sheet_at(voxel_sheets, cell, grid_size, part);
+        if ((kinds >> part & 1u) == 1u) {
+            Sheet sheet = sheet_at(voxel_sheets, own, part);
             vec3 front = emission;
             vec3 back = emission;
 #if HAS_RSM_DEPTH
             float covered = 0.0;
 #if HAS_VOXEL_LAMPS
-            covered = texelFetch(voxel_lamps, cell, 0)[part >> 1];
+            covered = lamps_cover(cell, part >> 1);
             ivec3 before = cell + ivec3(axis_vector(part >> 1)) * ((part & 1) == 0 ? 1 : -1);
             if (all(greaterThanEqual(before, ivec3(0))) && all(lessThan(before, grid_size))) {
-                covered = max(covered, texelFetch(voxel_lamps, before, 0)[part >> 1]);
+                covered = max(covered, lamps_cover(before, part >> 1));
             }
 #endif
             vec3 n = sheet_normal(sheet, part);
@@ -164,17 +178,15 @@ void main()
 #endif
 #if HAS_VOXEL_BOUNCE
             if (add_bounce == 1) {
-                front += texelFetch(bounce_now, part_texel(cell, grid_size, part >> 1, part & 1), 0).rgb;
-                back += texelFetch(bounce_back_now, cell, 0).rgb;
+                front += texelFetch(bounce_now, store_texel(own), 0).rgb;
+                back += texelFetch(bounce_back_now, store_texel(number), 0).rgb;
             }
 #endif
             float share = squares_share(sheet.squares);
-            fronts = vec4(front, 1.0) * share;
             backs += vec4(back, 1.0) * share;
-        }
-        if (fronts.a > 0.0 || first_time == 1) {
-            imageStore(voxel_radiance, part_texel(cell, grid_size, part >> 1, part & 1), clamp(fronts, -HALF_END, HALF_END));
+            imageStore(voxel_radiance, store_texel(own), clamp(vec4(front, 1.0) * share, -HALF_END, HALF_END));
+            ++own;
         }
     }
-    imageStore(voxel_back, cell, clamp(backs, -HALF_END, HALF_END));
+    imageStore(voxel_back, store_texel(number), clamp(backs, -HALF_END, HALF_END));
 }

@@ -3,52 +3,57 @@
 
 #include "engines/vct/volume_lib.glsl"
 
-layout(local_size_x = 4, local_size_y = 4, local_size_z = 4) in;
-layout(binding = 4, rgba16f) readonly uniform image3D finer;
-layout(binding = 5, rgba16f) writeonly uniform image3D coarser;
-layout(binding = 6, rgba16f) readonly uniform image3D finer_back;
-layout(binding = 7, rgba16f) writeonly uniform image3D coarser_back;
-uniform ivec3 coarse_size;
+layout(local_size_x = 64) in;
 uniform int coarse_level;
+
+// Light of `part` of a cell of the finer level; `part` −1 is that of backs.
+vec4 finer_light(ivec3 cell, int part)
+{
+    int level = coarse_level - 1;
+    vec4 texel = texelFetch(voxel_kinds, cell, level);
+    uint kinds = kinds_of(texel);
+    if (kinds >= 64u || (part >= 0 && (kinds >> part & 1u) == 0u)) {
+        return vec4(0.0);
+    }
+    uint number = first_number(voxel_rows, texel, cell, grid_size, level);
+    return part < 0 ? imageLoad(voxel_back, store_texel(number))
+                    : imageLoad(voxel_radiance, store_texel(number + sheets_before(kinds, part)));
+}
 
 void main()
 {
-    ivec3 cell = ivec3(gl_GlobalInvocationID);
-    if (any(greaterThanEqual(cell, coarse_size))) {
+    uint number = invoked_number();
+    ivec3 cell;
+    uint kinds;
+    if (!first_of_cell(voxel_places, voxel_rows, voxel_kinds, grid_size, coarse_level, number, cell, kinds)) {
         return;
     }
-    uint kinds = kinds_of(texelFetch(voxel_kinds, cell, coarse_level));
-    kinds = kinds >= 64u ? 0u : kinds;
-    if (kinds == 0u && first_time == 0) {
-        return; // as it was
-    }
-    ivec3 fine_size = 2 * coarse_size;
+    uint own = number;
     for (int part = 0; part < 6; ++part) {
-        int axis = part >> 1;
+        if ((kinds >> part & 1u) == 0u) {
+            continue;
+        }
         int side = part & 1;
-        ivec3 along = ivec3(axis_vector(axis));
+        ivec3 along = ivec3(axis_vector(part >> 1));
         ivec3 u = along.zxy;
         ivec3 v = along.yzx;
         // The cell on the part's side is in front.
         ivec3 front = 2 * cell + along * (1 - side);
         ivec3 behind = 2 * cell + along * side;
         vec4 light = vec4(0.0);
-        bool there = (kinds >> part & 1u) == 1u;
-        if (!there && first_time == 0) {
-            continue;
-        }
-        for (int column = 0; column < (there ? 4 : 0); ++column) {
+        for (int column = 0; column < 4; ++column) {
             ivec3 across = u * (column & 1) + v * (column >> 1);
-            vec4 near = imageLoad(finer, part_texel(front + across, fine_size, axis, side));
-            vec4 far = imageLoad(finer, part_texel(behind + across, fine_size, axis, side));
+            vec4 near = finer_light(front + across, part);
+            vec4 far = finer_light(behind + across, part);
             float seen = min(far.a, 1.0 - min(near.a, 1.0));
             light += 0.25 * (near + (far.a > 0.0 ? far * (seen / far.a) : vec4(0.0)));
         }
-        imageStore(coarser, part_texel(cell, coarse_size, axis, side), light);
+        imageStore(voxel_radiance, store_texel(own), light);
+        ++own;
     }
     vec4 back = vec4(0.0);
-    for (int k = 0; k < (kinds == 0u ? 0 : 8); ++k) {
-        back += imageLoad(finer_back, 2 * cell + ivec3(k & 1, (k >> 1) & 1, k >> 2));
+    for (int k = 0; k < 8; ++k) {
+        back += finer_light(2 * cell + ivec3(k & 1, (k >> 1) & 1, k >> 2), -1);
     }
-    imageStore(coarser_back, cell, 0.125 * back);
+    imageStore(voxel_back, store_texel(number), 0.125 * back);
 }

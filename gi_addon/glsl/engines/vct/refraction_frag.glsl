@@ -39,7 +39,7 @@ void main()
     // Clear glass is not in the voxels. Tinted glass is, by what it takes; that is in `tint` already, so the cone leaves it: by
     // its far side's front, or by a sheet's back.
     vec3 start = (ray.position_ws - grid.low) / grid.cell + LIFT * ray.direction;
-    float side = surface_side(voxel_sheets, voxel_kinds, grid, start, ray.direction);
+    float side = surface_side(voxel_sheets, voxel_rows, voxel_kinds, grid, start, ray.direction);
     ConeResult result = trace_seen(grid, Cone(start, ray.direction, spread, 1e30, side));
     // A cone that leaves the scene knows nothing of what is there.
     if (result.transmittance < 0.5) {

@@ -1,4 +1,4 @@
-// What mirrors and panes show. Included where `voxel_albedo` is declared too.
+// What mirrors and panes show.
 
 #include "engines/vct/diffuse_lib.glsl"
 
@@ -9,7 +9,7 @@ const int SEEN_CONES = 2;
 // arrives at surfaces by one bounce less.
 ConeResult trace_seen(Grid grid, Cone cone)
 {
-    ConeResult seen = trace_cone(voxel_radiance, voxel_back, voxel_sheets, voxel_extents, voxel_kinds, grid, cone);
+    ConeResult seen = trace_cone(voxel_radiance, voxel_back, voxel_sheets, voxel_rows, voxel_kinds, grid, cone);
     Meeting met = seen.first;
     if (met.opacity > 0.0) {
         mat3 frame = frame_from_normal(met.normal);
@@ -17,10 +17,10 @@ ConeResult trace_seen(Grid grid, Cone cone)
         float spread = cone_spread(1.0 / (float(SEEN_CONES) * cone_sets));
         uint run = hash_u32(uvec2(gl_FragCoord.xy)) + view.subframe * uint(SEEN_CONES);
         vec3 gathered = vec3(0.0);
-        vec4 albedo = texelFetch(voxel_albedo, met.cell, 0);
+        vec4 albedo = sheet_albedo(voxel_sheets, met.number);
         for (int i = 0; i < SEEN_CONES; ++i) {
             Cone next = Cone(start, frame * cone_direction(run + uint(i)), spread, 1e30, met.front ? 1.0 : -1.0);
-            gathered += trace_cone(voxel_radiance, voxel_back, voxel_sheets, voxel_extents, voxel_kinds, grid, next).radiance;
+            gathered += trace_cone(voxel_radiance, voxel_back, voxel_sheets, voxel_rows, voxel_kinds, grid, next).radiance;
         }
         seen.radiance += albedo.rgb * albedo.a * gathered * (met.opacity / float(SEEN_CONES));
     }

@@ -21,7 +21,7 @@ void main()
     vec3 ng = octahedral_decode(normals.zw);
     Grid grid = Grid(grid_low, grid_cell, vec3(grid_size), grid_levels);
     vec3 p = (position_ws - grid.low) / grid.cell;
-    float side = surface_side(voxel_sheets, voxel_kinds, grid, p, ng);
+    float side = surface_side(voxel_sheets, voxel_rows, voxel_kinds, grid, p, ng);
     uint turn = hash_u32(uvec3(pixel, view.subframe));
     for (int i = 0; i < light_count; ++i) {
         Light light = lights[i];
@@ -38,7 +38,7 @@ void main()
                 vec3 d = cone_direction(turn + uint(k));
                 Cone cone = Cone(p + LIFT * ng, normalize(l + frame * vec3(d.xy, 0.0) * tan(min(angle, 0.785))), // 45°
                                  0.0, reach, side);
-                visible += trace_open(voxel_sheets, voxel_extents, voxel_kinds, grid, cone) / float(cone_count);
+                visible += trace_open(voxel_sheets, voxel_rows, voxel_kinds, grid, cone) / float(cone_count);
             }
         }
         imageStore(shadow_cones, ivec3(pixel, i), vec4(visible));

@@ -41,7 +41,7 @@ bool see_each_other(Gatherer here, Gatherer there)
     vec3 way = there.at - here.at;
     float reach = length(way);
     Cone cone = Cone(here.at + OWN_HEIGHT * here.ng, way / max(reach, 1e-6), 0.0, reach, 0.0);
-    return trace_open(voxel_sheets, voxel_extents, voxel_kinds, voxel_grid(), cone) > 0.5;
+    return trace_open(voxel_sheets, voxel_rows, voxel_kinds, voxel_grid(), cone) > 0.5;
 }
 
 // Adds a cone's light and its weight.

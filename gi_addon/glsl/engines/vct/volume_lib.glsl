@@ -1,13 +1,14 @@
 // What the voxels hold, and what light leaves them, by side.
 //
 // A cell has a sheet of surface for each of the six sides that its surfaces face most (passes/voxels.py): a plane,
-// x_k + slope · (u, v) = height about the cell's middle, along axis k with u and v the next axes round, and which of 4 × 4
-// squares of the face it covers.
+// x_k + slope · (u, v) = height about the cell's middle, along axis k with u and v the next axes round, which of 4 × 4
+// squares of the face it covers, and how far it reaches over it.
 //
-// Light is kept in an atlas of six parts, sheets' sides +x … −z; part (side, axis) lies at (side, 0, axis) of 2 × 1 × 3.
-// Alpha is the share of the face that the sheet covers, rgb radiance × alpha, in units of `radiance_unit`. Light that leaves sheets by their backs (a sheet
-// without thickness, lit from behind) is in a volume of its own.
+// Sheets, and light by sheet, are kept one after another (passes/voxel_store.glsl), of the cells and of each mip. Light's alpha is the
+// share of the face that the sheet covers, rgb radiance × alpha, in units of `radiance_unit`. Light that leaves sheets by their backs
+// (a sheet without thickness, lit from behind) is kept by cell, with its first sheet. A cell without the sheet has no light: 0.
 
+#include "passes/voxel_store.glsl"
 #include "lib/math_lib.glsl"
 
 struct Grid {
@@ -21,12 +22,8 @@ struct Sheet {
     vec3 slant;     // 1 along the axis, the slopes along the others
     float height;   // over the cell's middle, cells
     uint squares;   // a bit for each that is covered
+    vec4 far;       // how far it reaches over the face, down u and v from its far sides, up from its near ones, cells
 };
-
-ivec3 part_texel(ivec3 cell, ivec3 size, int axis, int side)
-{
-    return ivec3(cell.x + side * size.x, cell.y, cell.z + axis * size.z);
-}
 
 vec3 axis_vector(int axis) { return vec3(equal(ivec3(axis), ivec3(0, 1, 2))); }
 
@@ -39,11 +36,26 @@ vec3 along_axis(float x, vec2 uv, int axis)
     return axis == 0 ? vec3(x, uv) : axis == 1 ? vec3(uv.y, x, uv.x) : vec3(uv, x);
 }
 
-Sheet sheet_at(sampler3D sheets, ivec3 cell, ivec3 size, int part)
+// Kinds of sheets in a cell: 1 … 63 a bit each, or 64 + level of the largest empty block.
+uint kinds_of(vec4 texel) { return uint(texel.r * 255.0 + 0.5); }
+
+// The number of the first sheet of a cell of `level`, by what it holds, in a grid of `size` cells.
+uint first_number(usampler2D rows, vec4 texel, ivec3 cell, ivec3 size, int level)
 {
-    vec4 texel = texelFetch(sheets, part_texel(cell, size, part >> 1, part & 1), 0);
-    return Sheet(along_axis(1.0, texel.xy * 2.0 - 1.0, part >> 1), texel.z * 3.0 - 1.5, uint(texel.w * 65535.0 + 0.5));
+    uvec2 before = uvec2(texel.ba * 255.0 + 0.5);
+    return texelFetch(rows, store_texel(row_of(cell, size, level)), 0).r + (before.x | before.y << 8u);
 }
+
+// The sheet of `part` by its number.
+Sheet sheet_at(usampler2D sheets, uint number, int part)
+{
+    uvec3 texel = texelFetch(sheets, store_texel(number), 0).xyz;
+    vec2 slopes = unpackUnorm2x16(texel.x) * 2.0 - 1.0;
+    return Sheet(along_axis(1.0, slopes, part >> 1), unpackUnorm2x16(texel.y).x * 3.0 - 1.5, texel.y >> 16u, unpackUnorm4x8(texel.z));
+}
+
+// Of the cell with the sheet: mean share of light that its surfaces reflect; how much of it is diffuse.
+vec4 sheet_albedo(usampler2D sheets, uint number) { return unpackUnorm4x8(texelFetch(sheets, store_texel(number), 0).w); }
 
 // A sheet's front normal.
 vec3 sheet_normal(Sheet sheet, int part) { return normalize(sheet.slant) * ((part & 1) == 0 ? 1.0 : -1.0); }
@@ -58,13 +70,50 @@ vec2 square_middle(int square) { return (vec2(square & 3, square >> 2) + 0.5) * 
 
 float squares_share(uint squares) { return float(bitCount(squares)) / 16.0; }
 
-// Kinds of sheets in a cell: 1 … 63 a bit each, or 64 + level of the largest empty block.
-uint kinds_of(vec4 texel) { return uint(texel.r * 255.0 + 0.5); }
-
-// One part at `uvw` in [0, 1]³ of the grid, filtered within level `lod`. Half a texel stays between neighbouring parts.
-vec4 part_at(sampler3D atlas, Grid grid, vec3 uvw, float lod, int part)
+// Light of `part` of the cells of `level` around `p` (cells of the finest), which lies in cell `within` of that level along the part's
+// axis: filtered across it. Light of backs has no part; it is filtered the same way.
+vec4 light_at(sampler2D light, usampler2D rows, sampler3D kinds, Grid grid, int level, vec3 p, int within, int part, bool front)
 {
-    vec3 margin = 0.5 * exp2(lod) / grid.size;
-    uvw = clamp(uvw, margin, 1.0 - margin);
-    return textureLod(atlas, vec3((uvw.x + float(part & 1)) / 2.0, uvw.y, (uvw.z + float(part >> 1)) / 3.0), lod);
+    ivec3 size = ivec3(grid.size);
+    int axis = part >> 1;
+    vec2 uv = across_axis(p * exp2(float(-level)), axis) - 0.5;
+    vec2 share = fract(uv);
+    vec4 sum = vec4(0.0);
+    for (int k = 0; k < 4; ++k) {
+        ivec2 step_ = ivec2(k & 1, k >> 1);
+        ivec2 at = ivec2(floor(uv)) + step_;
+        ivec3 cell = axis == 0 ? ivec3(within, at) : axis == 1 ? ivec3(at.y, within, at.x) : ivec3(at, within);
+        cell = clamp(cell, ivec3(0), (size >> level) - 1);
+        vec4 texel = texelFetch(kinds, cell, level);
+        uint found = kinds_of(texel);
+        if (found < 64u && (!front || (found >> part & 1u) == 1u)) {
+            uint number = first_number(rows, texel, cell, size, level) + (front ? sheets_before(found, part) : 0u);
+            vec2 weight = mix(1.0 - share, share, vec2(step_));
+            sum += texelFetch(light, store_texel(number), 0) * (weight.x * weight.y);
+        }
+    }
+    return sum;
+}
+
+// In a compute shader whose invocations are the sheets: the number of this one's.
+#define invoked_number() (gl_GlobalInvocationID.y * STORE_WIDTH + gl_GlobalInvocationID.x)
+
+// Whether `number`, counted within `level`, is the first sheet of a cell of it; then its number among all, the cell and its kinds.
+bool first_of_cell(usampler2D places, usampler2D rows, sampler3D kinds_, ivec3 size, int level, inout uint number, out ivec3 cell,
+                   out uint kinds)
+{
+    ivec3 here = size >> level;
+    uint first_row = rows_before(size, level);
+    uint first = texelFetch(rows, store_texel(first_row), 0).r;
+    uint end = texelFetch(rows, store_texel(first_row + uint(here.y * here.z)), 0).r;
+    number += first;
+    cell = ivec3(0);
+    kinds = 0u;
+    if (number >= end) {
+        return false;
+    }
+    uint place = texelFetch(places, store_texel(number), 0).r;
+    cell = place_cell(place);
+    kinds = kinds_of(texelFetch(kinds_, cell, level));
+    return sheets_before(kinds, place_part(place)) == 0u;
 }

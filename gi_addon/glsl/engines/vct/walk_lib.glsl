@@ -18,10 +18,12 @@ const float WALK_END = 1e-3;    // of the light
 
 struct Walk {
     vec3 weight;  // share of the light that comes out, 0 where none does
-    ivec3 cell;   // where it comes out
+    vec3 at;      // where it comes out, cells
+    uint number;  // of the sheet there
     int part;
-    vec3 at;      // cells
 };
+
+bool scatters_below(usampler2D bodies, uint number) { return (texelFetch(bodies, store_texel(number), 0).y >> 16u) > 0u; }
 
 // Height of a point over a sheet's front, cells, and how it grows along a direction.
 float sheet_height(Sheet sheet, int part, vec3 from_middle)
@@ -36,8 +38,8 @@ float sheet_rise(Sheet sheet, int part, vec3 direction)
 
 // Whether a straight way of length `reach` leaves the body; then where. A sheet's plane is taken as it goes through the cell: what
 // has slipped between the planes of two neighbouring cells leaves as it comes to the second.
-bool leaves_body(sampler3D sheets, sampler3D kinds, usampler3D bodies, Grid grid, vec3 start, vec3 direction, float reach,
-                 inout Walk walk)
+bool leaves_body(usampler2D sheets, usampler2D rows, sampler3D kinds, usampler2D bodies, Grid grid, vec3 start, vec3 direction,
+                 float reach, inout Walk walk)
 {
     vec3 d = mix(direction, vec3(1e-6), lessThan(abs(direction), vec3(1e-6)));
     vec3 inverse = 1.0 / d;
@@ -51,16 +53,21 @@ bool leaves_body(sampler3D sheets, sampler3D kinds, usampler3D bodies, Grid grid
             break;
         }
         ivec3 cell = ivec3(floor(p));
-        uint found = kinds_of(texelFetch(kinds, cell, 0));
+        vec4 texel = texelFetch(kinds, cell, 0);
+        uint found = kinds_of(texel);
         float width = found >= 64u ? float(1u << (found - 64u)) : 1.0;
         vec3 out_at = (floor(p / width) * width + forward * width - p) * inverse;
         float t_out = t + max(min(out_at.x, min(out_at.y, out_at.z)), 0.0);
-        uint parts = found < 64u ? body_parts(texelFetch(bodies, cell, 0)) & found : 0u;
+        uint number = found < 64u ? first_number(rows, texel, cell, size, 0) : 0u;
         vec3 from = start - vec3(cell) - 0.5;
         float end = min(t_out, reach);
         for (int part = 0; part < 6; ++part) {
-            if ((parts >> part & 1u) == 1u) {
-                Sheet sheet = sheet_at(sheets, cell, size, part);
+            if (found < 64u && (found >> part & 1u) == 1u) {
+                uint own = number++;
+                if (!scatters_below(bodies, own)) {
+                    continue;
+                }
+                Sheet sheet = sheet_at(sheets, own, part);
                 float rise = sheet_rise(sheet, part, d);
                 float height = sheet_height(sheet, part, from);
                 if (rise > 0.0 && height + rise * end > 0.0) {
@@ -69,7 +76,7 @@ bool leaves_body(sampler3D sheets, sampler3D kinds, usampler3D bodies, Grid grid
                     ivec2 square = clamp(ivec2(floor((uv + 0.5) * 4.0)), ivec2(0), ivec2(3));
                     if (at < first && (sheet.squares >> (square.x + 4 * square.y) & 1u) == 1u) {
                         first = at;
-                        walk.cell = cell;
+                        walk.number = own;
                         walk.part = part;
                     }
                 }
@@ -82,19 +89,20 @@ bool leaves_body(sampler3D sheets, sampler3D kinds, usampler3D bodies, Grid grid
 }
 
 // Radius of a sphere around a point that no sheet of the body meets, cells.
-float empty_around(sampler3D sheets, sampler3D kinds, usampler3D bodies, Grid grid, vec3 p)
+float empty_around(usampler2D sheets, usampler2D rows, sampler3D kinds, usampler2D bodies, Grid grid, vec3 p)
 {
     ivec3 size = ivec3(grid.size);
     ivec3 cell = clamp(ivec3(floor(p)), ivec3(0), size - 1);
-    uint found = kinds_of(texelFetch(kinds, cell, 0));
+    vec4 texel = texelFetch(kinds, cell, 0);
+    uint found = kinds_of(texel);
     float width = found >= 64u ? float(1u << (found - 64u)) : 1.0;
     vec3 inside = p - floor(p / width) * width;
     inside = min(inside, width - inside);
     float radius = min(inside.x, min(inside.y, inside.z));
-    uint parts = found < 64u ? body_parts(texelFetch(bodies, cell, 0)) & found : 0u;
+    uint number = found < 64u ? first_number(rows, texel, cell, size, 0) : 0u;
     for (int part = 0; part < 6; ++part) {
-        if ((parts >> part & 1u) == 1u) {
-            Sheet sheet = sheet_at(sheets, cell, size, part);
+        if (found < 64u && (found >> part & 1u) == 1u && scatters_below(bodies, number++)) {
+            Sheet sheet = sheet_at(sheets, number - 1u, part);
             radius = min(radius, -sheet_height(sheet, part, p - vec3(cell) - 0.5) / length(sheet.slant));
         }
     }
@@ -102,20 +110,20 @@ float empty_around(sampler3D sheets, sampler3D kinds, usampler3D bodies, Grid gr
 }
 
 // A walk of mean free path `path` (cells) that goes in at `start` (cells) along `direction`.
-Walk walk_below(sampler3D sheets, sampler3D kinds, usampler3D bodies, Grid grid, vec3 start, vec3 direction, float path,
-                vec3 alpha, inout uint state)
+Walk walk_below(usampler2D sheets, usampler2D rows, sampler3D kinds, usampler2D bodies, Grid grid, vec3 start, vec3 direction,
+                float path, vec3 alpha, inout uint state)
 {
-    Walk walk = Walk(vec3(1.0), ivec3(0), 0, start);
+    Walk walk = Walk(vec3(1.0), start, 0u, 0);
     vec3 decay = vec3(diffuse_decay(alpha.r), diffuse_decay(alpha.g), diffuse_decay(alpha.b));
     bool left = false;
     for (int i = 0; i < WALK_STEPS; ++i) {
         if (left || max3(walk.weight) < WALK_END) {
             break;
         }
-        left = leaves_body(sheets, kinds, bodies, grid, walk.at, direction, -path * log(1.0 - draw(state)), walk);
+        left = leaves_body(sheets, rows, kinds, bodies, grid, walk.at, direction, -path * log(1.0 - draw(state)), walk);
         if (!left) {
             walk.weight *= alpha;
-            float radius = empty_around(sheets, kinds, bodies, grid, walk.at);
+            float radius = empty_around(sheets, rows, kinds, bodies, grid, walk.at);
             if (radius > DEEP * path) {
                 walk.at += draw_direction(state) * radius;
                 walk.weight *= share_across_sphere(decay, radius / path);
