@@ -160,6 +160,7 @@ class Voxelisation(Pass):
 
     title = "Voxelization"
     figure = "Voxelization"
+    only = ""  # the flag that materials must have to be drawn
     reads = (Optional("brdf.albedo"), Optional("brdf.average"), Optional("brdf.energy"))
     writes = (
         Texture("voxels.kinds", "voxel_kinds", "r: a bit for each kind of sheet in the cell or, in an empty one, 64 + level of "
@@ -246,8 +247,7 @@ class Voxelisation(Pass):
             resolve.run(*store_groups(min(size, sheets - first)))
             frame.gl.ctx.memory_barrier()
 
-    @staticmethod
-    def _draw(frame: Frame, planned: Planned, grid: VoxelGrid, values: dict, **defines: int) -> None:
+    def _draw(self, frame: Frame, planned: Planned, grid: VoxelGrid, values: dict, **defines: int) -> None:
         """All triangles, along the axes that they face."""
         target = frame.pool.framebuffer([frame.resources["voxels.raster"]])
         target.use()
@@ -261,7 +261,7 @@ class Voxelisation(Pass):
             "fragment": "passes/voxels_frag.glsl",
         }  # fmt: skip
         options = {
-            "full": True, "units": len(planned.texture_reads()), "defines": {
+            "full": True, "only": self.only, "units": len(planned.texture_reads()), "defines": {
                 "SURFACE_TABLES": 2 if planned.has("brdf.average") else 0, "SURFACE_SEE_THROUGH_GLASS": 1,
                 "SURFACE_SEEN_BY_CAMERA": 0, "SURFACE_SEEN_BY_SHADOW": 0, **defines,
             },
@@ -309,6 +309,16 @@ class Voxelisation(Pass):
                               f"is {counts[0]} and {sum(counts)}")  # fmt: skip
             planned.memory["sheets"] = int(total[0])
         return planned.memory["sheets"]
+
+
+class BodyVoxels(Voxelisation):
+    """The sheets that light scatters below: what walks go between, in engines without voxels of their own."""
+
+    title = "Body Voxelization"
+    only = "subsurface"
+
+    def absent(self, facts: Facts) -> str | None:
+        return super().absent(facts) or no_bodies(facts)
 
 
 def _bind_words(frame: Frame, level: int = 0, above: int = 0) -> None:
