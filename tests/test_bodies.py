@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import voxel_store
 from conftest import make
+from test_lpv import flux_of, volumes
 from test_subsurface import albedo_of_turns, lit_slab, wax
 
 from gi_addon.compare import scenes
@@ -116,3 +117,41 @@ def test_what_scatters_nowhere_costs_nothing(gl):
             assert technique == "VCT" or not [name for name in plan.resources if name.startswith("voxels.")]
     plan = inspect(sun_on_ball(wax(0.1)), settings("VCT"), resolution=(32, 18))
     assert set(bodies) <= set(plan.resources)
+
+
+# --- light propagation volumes ------------------------------------------------------------------------------------------
+
+
+def test_a_slabs_flux_goes_into_the_volume_on_the_side_that_it_leaves(gl):
+    """Of 48 W that the sun sends into a slab of 4 × 4 m: by the sources' sum, and by their first moment, 2/3 of the far side's
+    flux less the near one's."""
+    grid, source, _, _ = volumes(lit_slab(0.1, wax(0.05), 1.0), lpv__cascades="1")
+    through, back = slab_lit_evenly(2.0, 0.8)
+    assert flux_of(source, grid.cell).mean() / 48.0 == pytest.approx(through + back, abs=0.02)
+    first = np.sqrt(4.0 * np.pi / 3.0) * source[1, ..., 0].sum() * grid.cell**2  # c₁: along y
+    assert 1.5 * first / 48.0 == pytest.approx(through - back, abs=0.02)
+    grid, source, _, _ = volumes(lit_slab(0.1, wax(1e-4), 1.0), lpv__cascades="1")
+    assert flux_of(source, grid.cell).mean() / 48.0 == pytest.approx(0.8, abs=0.005)
+
+
+# --- both, against Cycles -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.blender
+@pytest.mark.parametrize(("technique", "within"), [("VCT", 0.15), ("LPV", 0.2)])
+def test_a_window_of_wax_lights_a_dark_room_as_in_cycles(blender, gl, technique, within):
+    """R1, Diffuse Indirect of floor, walls and ceiling, as a whole. Both send it out by Lambert's law, Cycles does not quite."""
+    from gi_addon.host.build import build
+    from gi_addon.host.cycles import Reference, render_passes, set_up
+
+    scene, size = waxen_window(wax(0.1, Specular_IOR_Level=0.5)), (32, 18)
+    there = build(scene)
+    there.render.resolution_x, there.render.resolution_y, there.render.resolution_percentage = *size, 100
+    set_up(there, Reference(1, 256))
+    expected = render_passes(there, ("Diffuse Indirect",))["Diffuse Indirect"][..., :3]
+    options = {"technique": technique, "samples": 2, "resolution": size, "vct__resolution": 32}
+    found, dark = (make(scene, "Diffuse Indirect", use_translucency=on, **options).passes["Diffuse Indirect"][..., :3]
+                   for on in (True, False))  # fmt: skip
+    room = expected.max(axis=-1) > 0.05 * expected.max()
+    assert found[room].sum() / expected[room].sum() == pytest.approx(1.0, abs=within)
+    assert dark[room].sum() < 0.02 * expected[room].sum()

@@ -96,7 +96,7 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
     ]
 
 
-# Walks through a body from each of its sheets, in all sub-frames, that go side by side; how many groups of those share the sheets.
+# Walks from each sheet of a body in all sub-frames; how many go side by side; how many groups of those share the sheets.
 WALKS, LANES, _WALKERS = 96, 32, 1024
 
 
@@ -175,8 +175,8 @@ class RadianceInjection(Pass):
                 "their backs; alpha, the sum of what they cover", "rgba16f", all_sheets, access="readwrite", scratch=True),
         Texture("vct.bounce", "voxel_bounce", "by sheet of the cells: radiance of the later bounces, in units", "rgba16f",
                 cell_sheets, when=_one_bounce, scratch=True),
-        Texture("vct.walked", "voxel_walked", "by sheet of the cells: vct.radiance after light has walked through bodies", "rgba16f",
-                cell_sheets, when=no_bodies, scratch=True),
+        Texture("vct.walked", "voxel_walked", "by sheet of the cells: vct.radiance after light has walked through bodies",
+                "rgba16f", cell_sheets, when=no_bodies, scratch=True),
         Texture("vct.bounce_back", "voxel_bounce_back", "the same by the surfaces' backs, with the cell's first sheet", "rgba16f",
                 cell_sheets, when=_one_bounce, scratch=True),
     )  # fmt: skip

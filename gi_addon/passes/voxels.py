@@ -176,8 +176,9 @@ class Voxelisation(Pass):
                 when=lambda f: None if f.glowing_voxels else "no voxel shines: nothing emits, or lights sampled on it do"),
         Texture("voxels.lamps", "voxel_lamps", "by sheet: share of the cell's face that its lamps cover", "r8", cell_sheets,
                 when=lambda f: None if _lamps(f) else "no light is drawn from emissive surfaces"),
-        Texture("voxels.bodies", "voxel_bodies", "by sheet, packed (lib/body_lib.glsl): mean free path below it, share of what it "
-                "reflects that has been there, albedo, way in; 0 where there is none", "rgba32ui", cell_sheets, when=no_bodies),
+        Texture("voxels.bodies", "voxel_bodies", "by sheet, packed (lib/body_lib.glsl): mean free path below it, share of what "
+                "it reflects that has been there, albedo, way in; 0 where there is none", "rgba32ui", cell_sheets,
+                when=no_bodies),
         Texture("voxels.rows", "voxel_rows", "by row of cells, level after level: sheets before it; then how many there are",
                 "r32ui", lambda f: store_size(sum(_rows(f)) + 1), scratch=True),
         Texture("voxels.places", "voxel_places", "by sheet, level after level, packed: its cell and part", "r32ui", all_sheets,
