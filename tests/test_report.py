@@ -91,6 +91,18 @@ def test_ready_references_are_averaged_in_blocks(tmp_path):
         references.ready(tmp_path / "room.npz", (3, 2), ("Diffuse Indirect",))
 
 
+def test_ready_references_of_light_over_colour_are_light_over_colour_when_smaller(tmp_path):
+    """A block of one glossy pixel and three that have no lobe shows what the one shows, as a renderer of that size has it."""
+    light, color = np.zeros((2, 2, 3), "f2"), np.zeros((2, 2, 3), "f2")
+    light[0, 0], color[0, 0] = 0.5, 0.04
+    keys = {f"{kind}.{half}.{key}": a for kind in ("R1", "Rinf") for half in "AB"
+            for key, a in (("GlossInd", light), ("GlossCol", color))}  # fmt: skip
+    np.savez(tmp_path / "room.npz", **keys)
+    found = references.ready(tmp_path / "room.npz", (1, 1), ("Glossy Indirect", "Glossy Color"))
+    np.testing.assert_allclose(found["R1"].a["Glossy Indirect"], 0.5, rtol=1e-3)
+    np.testing.assert_allclose(found["R1"].a["Glossy Color"], 0.01, rtol=1e-3)
+
+
 # --- sweeps and resumption ------------------------------------------------------------------------------------------------
 
 

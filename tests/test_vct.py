@@ -24,7 +24,7 @@ def vct(scene, *outputs, **settings):
     return make(scene, *outputs, technique="VCT", **settings)
 
 
-def volume(scene, level: int = 0, **settings) -> np.ndarray:
+def volume(scene, level: int = 0, name: str = "vct.radiance", **settings) -> np.ndarray:
     """Light after one sub-frame: (axis, side, z, y, x, 4)."""
     chosen = Settings()
     chosen.technique, chosen.samples = "VCT", 1
@@ -34,11 +34,77 @@ def volume(scene, level: int = 0, **settings) -> np.ndarray:
     def job(g: GL):
         renderer = Renderer(g)
         renderer.render(scene, chosen, ("Diffuse Indirect",), resolution=(32, 18))
-        _, out = voxel_store.light(renderer, level)
+        _, out = voxel_store.light(renderer, level, name)
         renderer.close()
         return out
 
     return shared().call(job)
+
+
+# --- what light is on a sheet -----------------------------------------------------------------------------------------
+
+
+def test_a_low_step_throws_its_whole_shadow(gl):
+    """Sun at cosine .1 over a step of ⅖ of a cell: four cells of the lower floor are dark, though the lit edge is near to its
+    plane. Told by that nearness alone they shone as the step does."""
+    b = scenes.SceneBuilder("step")
+    step = 0.4 * 4.0 / 31.0
+    white = scenes.diffuse((0.8,) * 3)
+    upper = np.array([[[-2, -2, 0], [0, -2, 0], [0, 2, 0], [-2, 2, 0]]], "f8")
+    lower = np.array([[[0, -2, -step], [2, -2, -step], [2, 2, -step], [0, 2, -step]]], "f8")
+    riser = np.array([[[0, -2, -step], [0, 2, -step], [0, 2, 0], [0, -2, 0]]], "f8")
+    b.quads(np.concatenate([upper, lower, riser]), white)
+    b.light(scenes.sun_light((1.0, 0.0, -0.1), 10.0))
+    scene = b.build(scenes.perspective((0, -4, 3), (0, 0, 0), 0.9))
+    up = volume(scene, vct__resolution=32)[2, 0]
+    column = up[..., 0].sum((0, 1)) / np.maximum(up[..., 3].sum((0, 1)), 1e-9)
+    edge = len(column) // 2
+    lit = column[edge - 6 : edge - 2].mean()
+    assert column[edge + 1 : edge + 4].max() < 0.05 * lit
+    np.testing.assert_allclose(column[edge + 6 : edge + 10], lit, rtol=0.05)
+
+
+def test_a_corrugated_floor_sends_what_arrives(gl):
+    """Ridges of 35° and half a cell wide, sun at 80°: the lit facets are four times as bright as a flat floor, and half of the
+    surface is dark. Together they reflect what a flat floor does."""
+    white = scenes.diffuse((0.8,) * 3)
+    sent = []
+    for height in (0.0, 0.7):
+        b = scenes.SceneBuilder("corrugated")
+        width = 4.0 / 63.0 / 2.0
+        x = np.arange(-2.0, 2.0 - width / 2, width)
+        rise = height * width / 2.0
+        low, top, next_ = x, x + width / 2, x + width
+        facets = [
+            np.stack([np.stack([p, -2 + 0 * x, a + 0 * x], -1), np.stack([q, -2 + 0 * x, c + 0 * x], -1),
+                      np.stack([q, 2 + 0 * x, c + 0 * x], -1), np.stack([p, 2 + 0 * x, a + 0 * x], -1)], 1)
+            for p, q, a, c in ((low, top, 0.0, rise), (top, next_, rise, 0.0))
+        ]  # fmt: skip
+        b.quads(np.concatenate(facets), white)
+        b.light(scenes.sun_light((1.0, 0.0, -np.tan(np.radians(10.0))), 10.0))
+        scene = b.build(scenes.perspective((0, -4, 3), (0, 0, 0), 0.9))
+        seen, through = 0.0, 1.0
+        for layer in volume(scene, vct__resolution=32, rsm__resolution=2048)[2, 0, ::-1]:  # from above
+            seen, through = seen + through * layer[..., 0], through * (1.0 - layer[..., 3])
+        sent.append(seen[4:-4, 4:-4].mean())
+    assert sent[1] == pytest.approx(sent[0], rel=0.15)
+
+
+@pytest.mark.parametrize("up", [False, True])
+def test_a_floor_beside_a_lit_outer_wall_is_dark_whichever_way_it_faces(gl, up):
+    """A room without thickness, sunlit from outside. Cells where the floor meets the wall hold the wall's bright outer side too:
+    it leaves to that side alone, not upwards."""
+    b = scenes.SceneBuilder("room")
+    box = scenes.box_quads((-1, -1, 0), (1, 1, 2), inward=True)
+    floor = np.abs(box[..., 2]).max(axis=1) < 1e-9
+    box[floor] = box[floor][:, :: 1 if up else -1]
+    b.quads(box, scenes.diffuse((0.8,) * 3))
+    b.light(scenes.sun_light((-1.0, 0.0, -0.2), 10.0))
+    scene = b.build(scenes.perspective((0, -0.9, 1), (0, 0, 0.8), 1.2))
+    fronts, backs = (volume(scene, name=name, vct__resolution=32) for name in ("vct.radiance", "vct.back"))
+    floor_light = (fronts[2, 0] if up else backs[2, 1])[: fronts.shape[2] // 2]
+    assert floor_light[..., 3].max() == 1.0
+    assert floor_light[..., 0].max() < 1e-3 * backs[0, 1][..., 0].max()
 
 
 # --- energy -----------------------------------------------------------------------------------------------------------

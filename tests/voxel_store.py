@@ -26,11 +26,11 @@ def places(renderer: Renderer, level: int = 0) -> tuple[VoxelGrid, np.ndarray, n
     return grid, numbers, np.stack([place, place >> 9, place >> 18], -1) & 511, place >> 27
 
 
-def light(renderer: Renderer, level: int = 0) -> tuple[VoxelGrid, np.ndarray]:
-    """Light by part at a level: the grid, and (axis, side, z, y, x, 4)."""
+def light(renderer: Renderer, level: int = 0, name: str = "vct.radiance") -> tuple[VoxelGrid, np.ndarray]:
+    """Light by part at a level, of fronts or (``vct.back``) of backs: the grid, and (axis, side, z, y, x, 4)."""
     grid, numbers, cell, part = places(renderer, level)
     out = np.zeros((6, *(n >> level for n in grid.size[::-1]), 4), "f4")
-    out[part, cell[:, 2], cell[:, 1], cell[:, 0]] = store(renderer, "vct.radiance")[numbers]
+    out[part, cell[:, 2], cell[:, 1], cell[:, 0]] = store(renderer, name)[numbers]
     return grid, out.reshape(3, 2, *out.shape[1:])
 
 

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..outputs import OUTPUTS
 from . import exr
 
 # Passes by their names in a ready reference's file.
@@ -83,8 +84,9 @@ def ready(path: Path, resolution: tuple[int, int], passes: Iterable[str]) -> dic
     """References rendered elsewhere, R1 and Rinf, from an archive of arrays ``R1.A.DiffInd`` … (H, W, 3), row 0 at the top.
 
     Blocks of pixels are averaged where the archive's picture is a whole multiple of ``resolution``: of a box filter of one
-    pixel that is the smaller picture's box filter, no approximation. None if there is no such file. Raises ValueError for
-    another size.
+    pixel that is the smaller picture's box filter, no approximation. Passes that are light over colour (outputs.py) are the
+    blocks' light over their colour: the mean of four ratios would count pixels without a lobe as dark. None if there is no
+    such file. Raises ValueError for another size.
     """
     if not path.is_file():
         return None
@@ -98,13 +100,20 @@ def ready(path: Path, resolution: tuple[int, int], passes: Iterable[str]) -> dic
         return blocks.mean(axis=(1, 3), dtype="f8").astype("f4")
 
     with np.load(path, allow_pickle=False) as data:
+
+        def smaller(kind: str, half: str, name: str) -> np.ndarray | None:
+            key = f"{kind}.{half}.{READY_KEYS.get(name)}"
+            if key not in data.files:
+                return None
+            divide = OUTPUTS[name].divide
+            color = f"{kind}.{half}.{READY_KEYS.get(next((o.name for o in OUTPUTS.values() if o.layers == (divide,)), name))}"
+            if divide is None or color not in data.files:
+                return shrunk(data[key])
+            light, tint = shrunk(data[key].astype("f4") * data[color].astype("f4")), shrunk(data[color])
+            return np.divide(light, tint, out=np.zeros_like(light), where=tint > 0.0)
+
         return {
-            kind: Halves(
-                *(
-                    {n: shrunk(data[key]) for n in passes if (key := f"{kind}.{half}.{READY_KEYS.get(n)}") in data.files}
-                    for half in SEEDS
-                )
-            )
+            kind: Halves(*({n: a for n in passes if (a := smaller(kind, half, n)) is not None} for half in SEEDS))
             for kind in BOUNCES
         }
 

@@ -104,8 +104,8 @@ def _unlit(facts: Facts) -> str | None:
     return no_bounce(facts) or (None if facts.lit or facts.glowing_voxels else "no light shines")
 
 
-# The largest number that half floats hold, and how many sheets of a cell send light by their backs into one texel.
-_HALF_END, _SHEETS = 65504.0, 6
+# The largest number that half floats hold.
+_HALF_END = 65504.0
 
 
 def _irradiance_near(source: Source, distance: float) -> float:
@@ -137,7 +137,7 @@ def radiance_unit(facts: Facts) -> float:
         else:
             irradiance += float(brightest @ emitters.areas()) / near**2
     most = max((irradiance / np.pi + most) * max(facts.settings.bounces, 1), np.finfo("f4").tiny)
-    return float(2.0 ** np.ceil(np.log2(most * _SHEETS / _HALF_END)))
+    return float(2.0 ** np.ceil(np.log2(most / _HALF_END)))
 
 
 def _one_bounce(facts: Facts) -> str | None:
@@ -171,14 +171,14 @@ class RadianceInjection(Pass):
     writes = (
         Texture("vct.radiance", "voxel_radiance", "by sheet: radiance × alpha, in units, that leaves its front; alpha, the share "
                 "of the cell's face that it covers", "rgba16f", all_sheets, access="readwrite", scratch=True),
-        Texture("vct.back", "voxel_back", "by cell, with its first sheet: radiance × alpha, in units, that leaves sheets by "
-                "their backs; alpha, the sum of what they cover", "rgba16f", all_sheets, access="readwrite", scratch=True),
+        Texture("vct.back", "voxel_back", "the same that leaves its back", "rgba16f", all_sheets, access="readwrite",
+                scratch=True),
         Texture("vct.bounce", "voxel_bounce", "by sheet of the cells: radiance of the later bounces, in units", "rgba16f",
                 cell_sheets, when=_one_bounce, scratch=True),
+Texture("vct.bounce_back", "voxel_bounce_back", "the same by its back", "rgba16f", cell_sheets, when=_one_bounce,
+                scratch=True),
         Texture("vct.walked", "voxel_walked", "by sheet of the cells: vct.radiance after light has walked through bodies",
                 "rgba16f", cell_sheets, when=no_bodies, scratch=True),
-        Texture("vct.bounce_back", "voxel_bounce_back", "the same by the surfaces' backs, with the cell's first sheet", "rgba16f",
-                cell_sheets, when=_one_bounce, scratch=True),
     )  # fmt: skip
     uniforms = (
         *_LIGHT_UNIFORMS,

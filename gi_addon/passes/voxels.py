@@ -96,9 +96,12 @@ def voxel_grid(facts: Facts) -> VoxelGrid:
 
 
 def sheet_counts(facts: Facts) -> tuple[int, ...]:
-    """The most sheets that each level of the frame's grid can have, the cells first."""
+    """The sheets that there is memory for at each level of the frame's grid, the cells first: the most that there can be, rounded
+    up to an eighth, so that what moves seldom needs other memory."""
     grid = voxel_grid(facts)
-    return facts.once("sheets", (grid,), lambda scene: most_sheets(scene, grid.low, grid.cell, grid.size, grid.levels))
+    counts = facts.once("sheets", (grid,), lambda scene: most_sheets(scene, grid.low, grid.cell, grid.size, grid.levels))
+    eighths = [1 << max(n.bit_length() - 4, 0) for n in counts]
+    return tuple(-(-n // step) * step for n, step in zip(counts, eighths, strict=True))
 
 
 def store_size(count: int) -> tuple[int, int]:

@@ -33,7 +33,6 @@ void main()
     vec3 albedo = sheet_albedo(voxel_sheets, number).rgb;
     Grid grid = Grid(grid_low, grid_cell, vec3(grid_size), grid_levels);
     uint turn = hash_u32(uvec3(cell));
-    vec4 backs = vec4(0.0);
     uint own = number;
     for (int part = 0; part < 6; ++part) {
         if ((kinds >> part & 1u) == 1u) {
@@ -46,10 +45,10 @@ void main()
             float share = squares_share(sheet.squares);
             vec3 p = vec3(cell) + 0.5 + sheet_point(sheet, part, middle / (16.0 * share));
             vec3 front = albedo * gathered(grid, p, n, 1.0, turn);
+            vec3 back = albedo * gathered(grid, p, -n, -1.0, turn);
             imageStore(voxel_bounce, store_texel(own), vec4(front, 1.0));
+            imageStore(voxel_bounce_back, store_texel(own), vec4(back, 1.0));
             ++own;
-            backs += vec4(albedo * gathered(grid, p, -n, -1.0, turn), 1.0) * share;
         }
     }
-    imageStore(voxel_bounce_back, store_texel(number), backs.a > 0.0 ? backs / backs.a : vec4(0.0));
 }

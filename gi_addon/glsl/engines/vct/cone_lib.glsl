@@ -150,8 +150,8 @@ vec3 leaving_light(sampler2D atlas, sampler2D back, usampler2D rows, sampler3D k
     int level = int(clamp(floor(log2(max(cone.spread * met.t, 1.0))), 0.0, grid.levels));
     vec3 p = cone.start + cone.direction * met.t;
     int within = met.cell[met.part >> 1] >> level;
-    vec4 light = met.front ? light_at(atlas, rows, kinds, grid, level, p, within, met.part, true)
-                           : light_at(back, rows, kinds, grid, level, p, within, met.part, false);
+    vec4 light = met.front ? light_at(atlas, rows, kinds, grid, level, p, within, met.part)
+                           : light_at(back, rows, kinds, grid, level, p, within, met.part);
     return light.a > 0.0 ? light.rgb * (radiance_unit / light.a) : vec3(0.0);
 }
 

@@ -5,8 +5,10 @@
 // of each square that it covers. The ray from the light to that point ends on the sheet (lit, and this is what it reflects),
 // before it (blocked), or behind it (no surface there). So
 //     L = Σ_lit B/π / (lit + blocked)
-// with B the radiosity of the texel, albedo × irradiance × N·L: no resolution is in it, and a sheet half in shadow gives half
-// of its light. What shines through a translucent sheet leaves by its other side.
+// with B the radiosity, albedo × irradiance × cosine, by the texel's albedo and irradiance and the sheet's own normal: no
+// resolution is in it, a sheet half in shadow gives half of its light, and what is rough within a cell (mouldings under grazing
+// light) no more than arrives: lit facets send B by their own normals, but the dark ones beside them are in no map. What shines
+// through a translucent sheet leaves by its other side.
 
 #include "engines/vct/volume_lib.glsl"
 #if HAS_RSM_DEPTH
@@ -21,12 +23,11 @@ layout(binding = 13) uniform sampler2D bounce_back_now;
 #endif
 
 #if HAS_RSM_DEPTH
-// The light is on the sheet where it ends within what a bent surface leaves its mean plane by (R = 2 cells, cone_lib.glsl: at
-// most (√2)²/2R = ½) and faces as the sheet does, within 60°.
-const float ON_SHEET = 0.5;
+// The light is on the sheet where it ends in the sheet's own cell, or as far off as a square's middle may be off what it covers,
+// and faces as the sheet does, within 60°. Nearness to its plane would not do: under grazing light a shelf's shadow reaches many
+// cells, however little the shelf stands out.
+const float IN_CELL = 0.5 + 0.125;
 const float FACING = 0.5;
-// A texel that is so near that it may show another surface beside the point speaks for it if nothing else does.
-const float BESIDE_WEIGHT = 1e-3;
 
 // What a light does to one side of a sheet.
 struct Lit {
@@ -39,9 +40,9 @@ const Lit UNLIT = Lit(vec4(0.0), vec3(0.0), 0.0);
 
 Lit sum_of(Lit a, Lit b) { return Lit(a.sum + b.sum, a.through + b.through, a.blocked + b.blocked); }
 
-// What light of view `v` at point `p` of a sheet of normal `n` shows, added to the side that it shines on. Texels of what light
-// shines through stand for one of its sides each, for both (rsm_frag.glsl).
-void ask_view(int index, vec3 p, vec3 n, float covered, inout Lit front, inout Lit back)
+// What light of view `index` at point `p` of a sheet of normal `n`, in the cell around `center`, shows, added to the side that it
+// shines on. Texels of what light shines through stand for one of its sides each, for both (rsm_frag.glsl).
+void ask_view(int index, vec3 center, vec3 p, vec3 n, float covered, inout Lit front, inout Lit back)
 {
     LightView v = rsm_views[index];
     vec3 at = light_view_project(v, p);
@@ -60,26 +61,26 @@ void ask_view(int index, vec3 p, vec3 n, float covered, inout Lit front, inout L
     if (abs(facing) > GRAZING_COS * length(ray)) {
         hit = from + ray * (dot(t.position_ws - from, t.normal_ws) / facing);
     }
-    bool on_front = dot(ray, n) < 0.0;
+    float slope = dot(ray, n);
+    bool on_front = slope < 0.0;
     vec3 out_of = on_front ? n : -n;
     bool through = facing > 0.0;
-    bool on_sheet = abs(dot(hit - p, n)) <= ON_SHEET * grid_cell && dot(through ? -t.normal_ws : t.normal_ws, out_of) > FACING;
-    bool beside = !on_sheet && dot(hit - p, hit - p) <= t.area;
-    bool before = dot(hit - p, ray) < 0.0;
-    if (!on_sheet && !beside && !before) {
-        return;
+    bool on_sheet = max3(abs(hit - center)) <= IN_CELL * grid_cell && dot(through ? -t.normal_ws : t.normal_ws, out_of) > FACING;
+    if (!on_sheet && dot(hit - p, ray) >= 0.0) {
+        return; // behind
     }
     vec4 light = vec4(0.0);
-    if (on_sheet || beside) {
-        light = vec4(t.flux / (t.area * PI), 1.0) * (on_sheet ? 1.0 : BESIDE_WEIGHT);
+    if (on_sheet) {
+        // The beam's share that falls on the sheet, whichever of its facets takes it: flux / (beam / cosine) = B cosine / cos_g.
+        float cosine = abs(slope) / max(abs(facing), GRAZING_COS * length(ray));
+        light = vec4(t.flux * (cosine / (t.area * PI)), 1.0);
         // What a lamp lights in its own cell's reach leaves past the lamp: the slit above a ceiling lamp shares its cell
         // with the room, which sees the lamp.
         if (rsm_lights[v.light].kind == LIGHT_MESH && distance(p, from) < 1.733 * grid_cell) {
             light.rgb *= 1.0 - covered;
         }
     }
-    Lit here = Lit(vec4(through ? vec3(0.0) : light.rgb, light.a), through ? light.rgb : vec3(0.0),
-                   on_sheet || beside ? 0.0 : 1.0);
+    Lit here = Lit(vec4(through ? vec3(0.0) : light.rgb, light.a), through ? light.rgb : vec3(0.0), on_sheet ? 0.0 : 1.0);
     if (on_front) {
         front = sum_of(front, here);
     } else {
@@ -141,7 +142,6 @@ void main()
     emission = texelFetch(voxel_emission, store_texel(number), 0).rgb * emission_scale; // by both sides of a surface
 #endif
     vec3 center = grid_low + (vec3(cell) + 0.5) * grid_cell;
-    vec4 backs = vec4(0.0);
     uint own = number;
     for (int part = 0; part < 6; ++part) {
         if ((kinds >> part & 1u) == 1u) {
@@ -165,7 +165,7 @@ void main()
                 for (int square = 0; square < (outside ? 0 : 16); ++square) {
                     if ((sheet.squares >> square & 1u) == 1u) {
                         vec3 p = center + sheet_point(sheet, part, square_middle(square)) * grid_cell;
-                        ask_view(index, p, n, covered, lit_front, lit_back);
+                        ask_view(index, center, p, n, covered, lit_front, lit_back);
                     }
                 }
                 bool last = index + 1 == view_count || rsm_views[index + 1].light != rsm_views[index].light;
@@ -179,14 +179,13 @@ void main()
 #if HAS_VOXEL_BOUNCE
             if (add_bounce == 1) {
                 front += texelFetch(bounce_now, store_texel(own), 0).rgb;
-                back += texelFetch(bounce_back_now, store_texel(number), 0).rgb;
+                back += texelFetch(bounce_back_now, store_texel(own), 0).rgb;
             }
 #endif
             float share = squares_share(sheet.squares);
-            backs += vec4(back, 1.0) * share;
             imageStore(voxel_radiance, store_texel(own), clamp(vec4(front, 1.0) * share, -HALF_END, HALF_END));
+            imageStore(voxel_back, store_texel(own), clamp(vec4(back, 1.0) * share, -HALF_END, HALF_END));
             ++own;
         }
     }
-    imageStore(voxel_back, store_texel(number), clamp(backs, -HALF_END, HALF_END));
 }

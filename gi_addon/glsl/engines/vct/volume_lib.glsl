@@ -5,8 +5,8 @@
 // squares of the face it covers, and how far it reaches over it.
 //
 // Sheets, and light by sheet, are kept one after another (passes/voxel_store.glsl), of the cells and of each mip. Light's alpha is the
-// share of the face that the sheet covers, rgb radiance × alpha, in units of `radiance_unit`. Light that leaves sheets by their backs
-// (a sheet without thickness, lit from behind) is kept by cell, with its first sheet. A cell without the sheet has no light: 0.
+// share of the face that the sheet covers, rgb radiance × alpha, in units of `radiance_unit`. What leaves sheets by their backs is kept
+// the same way. A cell without the sheet has no light: 0.
 
 #include "passes/voxel_store.glsl"
 #include "lib/math_lib.glsl"
@@ -71,8 +71,8 @@ vec2 square_middle(int square) { return (vec2(square & 3, square >> 2) + 0.5) * 
 float squares_share(uint squares) { return float(bitCount(squares)) / 16.0; }
 
 // Light of `part` of the cells of `level` around `p` (cells of the finest), which lies in cell `within` of that level along the part's
-// axis: filtered across it. Light of backs has no part; it is filtered the same way.
-vec4 light_at(sampler2D light, usampler2D rows, sampler3D kinds, Grid grid, int level, vec3 p, int within, int part, bool front)
+// axis: filtered across it.
+vec4 light_at(sampler2D light, usampler2D rows, sampler3D kinds, Grid grid, int level, vec3 p, int within, int part)
 {
     ivec3 size = ivec3(grid.size);
     int axis = part >> 1;
@@ -86,8 +86,8 @@ vec4 light_at(sampler2D light, usampler2D rows, sampler3D kinds, Grid grid, int 
         cell = clamp(cell, ivec3(0), (size >> level) - 1);
         vec4 texel = texelFetch(kinds, cell, level);
         uint found = kinds_of(texel);
-        if (found < 64u && (!front || (found >> part & 1u) == 1u)) {
-            uint number = first_number(rows, texel, cell, size, level) + (front ? sheets_before(found, part) : 0u);
+        if (found < 64u && (found >> part & 1u) == 1u) {
+            uint number = first_number(rows, texel, cell, size, level) + sheets_before(found, part);
             vec2 weight = mix(1.0 - share, share, vec2(step_));
             sum += texelFetch(light, store_texel(number), 0) * (weight.x * weight.y);
         }
