@@ -175,7 +175,7 @@ class RadianceInjection(Pass):
                 scratch=True),
         Texture("vct.bounce", "voxel_bounce", "by sheet of the cells: radiance of the later bounces, in units", "rgba16f",
                 cell_sheets, when=_one_bounce, scratch=True),
-Texture("vct.bounce_back", "voxel_bounce_back", "the same by its back", "rgba16f", cell_sheets, when=_one_bounce,
+        Texture("vct.bounce_back", "voxel_bounce_back", "the same by its back", "rgba16f", cell_sheets, when=_one_bounce,
                 scratch=True),
         Texture("vct.walked", "voxel_walked", "by sheet of the cells: vct.radiance after light has walked through bodies",
                 "rgba16f", cell_sheets, when=no_bodies, scratch=True),
