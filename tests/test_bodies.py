@@ -138,8 +138,7 @@ def test_a_slabs_flux_goes_into_the_volume_on_the_side_that_it_leaves(gl):
 
 
 @pytest.mark.blender
-@pytest.mark.parametrize(("technique", "within"), [("VCT", 0.15), ("LPV", 0.2)])
-def test_a_window_of_wax_lights_a_dark_room_as_in_cycles(blender, gl, technique, within):
+def test_a_window_of_wax_lights_a_dark_room_as_in_cycles(blender, gl):
     """R1, Diffuse Indirect of floor, walls and ceiling, as a whole. Both send it out by Lambert's law, Cycles does not quite."""
     from gi_addon.host.build import build
     from gi_addon.host.cycles import Reference, render_passes, set_up
@@ -147,11 +146,10 @@ def test_a_window_of_wax_lights_a_dark_room_as_in_cycles(blender, gl, technique,
     scene, size = waxen_window(wax(0.1, Specular_IOR_Level=0.5)), (32, 18)
     there = build(scene)
     there.render.resolution_x, there.render.resolution_y, there.render.resolution_percentage = *size, 100
-    set_up(there, Reference(1, 256))
+    set_up(there, Reference(1, 128))
     expected = render_passes(there, ("Diffuse Indirect",))["Diffuse Indirect"][..., :3]
-    options = {"technique": technique, "samples": 2, "resolution": size, "vct__resolution": 32}
-    found, dark = (make(scene, "Diffuse Indirect", use_translucency=on, **options).passes["Diffuse Indirect"][..., :3]
-                   for on in (True, False))  # fmt: skip
     room = expected.max(axis=-1) > 0.05 * expected.max()
-    assert found[room].sum() / expected[room].sum() == pytest.approx(1.0, abs=within)
-    assert dark[room].sum() < 0.02 * expected[room].sum()
+    for technique in ("VCT", "LPV"):
+        options = {"technique": technique, "samples": 1, "resolution": size, "vct__resolution": 24}
+        found = make(scene, "Diffuse Indirect", **options).passes["Diffuse Indirect"][..., :3]
+        assert found[room].sum() / expected[room].sum() == pytest.approx(1.0, abs=0.15), technique
