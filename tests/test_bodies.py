@@ -67,23 +67,6 @@ def sun_on_ball(material):
     return b.build(scenes.orthographic((0, -1, 0), (0, 0, 0), 2.0, aspect=16 / 9))
 
 
-def waxen_window(material, thickness: float = 0.2):
-    """A dark room, without the wall before the camera, whose window is a slab that the sun shines on from outside."""
-    b = scenes.SceneBuilder()
-    white = scenes.diffuse((0.7,) * 3, "White")
-    b.quads(np.array([
-        [(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], [(-1, -1, 2), (-1, 1, 2), (1, 1, 2), (1, -1, 2)],
-        [(-1, -1, 0), (-1, 1, 0), (-1, 1, 2), (-1, -1, 2)], [(1, -1, 0), (1, -1, 2), (1, 1, 2), (1, 1, 0)],
-    ], float), white)  # fmt: skip
-    out = 1 + thickness
-    for low, high in (((-1, 1, 0), (-0.5, out, 2)), ((0.5, 1, 0), (1, out, 2)),
-                      ((-0.5, 1, 0), (0.5, out, 0.6)), ((-0.5, 1, 1.6), (0.5, out, 2))):  # fmt: skip
-        b.quads(scenes.box_quads(low, high), white)
-    b.quads(scenes.box_quads((-0.5, 1, 0.6), (0.5, out, 1.6)), material)
-    b.light(scenes.sun_light((0.0, -1.0, 0.0), 10.0))
-    return b.build(scenes.perspective((0, -2.6, 1.0), (0, 1, 1.0), 0.9))
-
-
 # --- voxel cone tracing ---------------------------------------------------------------------------------------------------
 
 
@@ -143,7 +126,7 @@ def test_a_window_of_wax_lights_a_dark_room_as_in_cycles(blender, gl):
     from gi_addon.host.build import build
     from gi_addon.host.cycles import Reference, render_passes, set_up
 
-    scene, size = waxen_window(wax(0.1, Specular_IOR_Level=0.5)), (32, 18)
+    scene, size = scenes.window(wax(0.1, Specular_IOR_Level=0.5)), (32, 18)
     there = build(scene)
     there.render.resolution_x, there.render.resolution_y, there.render.resolution_percentage = *size, 100
     set_up(there, Reference(1, 128))
