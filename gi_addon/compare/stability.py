@@ -59,12 +59,7 @@ TRAITS: dict[str, Traits] = {
 # Failures that are known, with their causes: shown beside the verdict. A test that fails and is not listed here fails the
 # test suite too.
 # Numbers beside a cause are what trying it gave; the others are measured only.
-KNOWN: dict[tuple[str, str], str] = {
-    ("VCT", "3"): "noise of six cones: the largest pixel has 1.011 of 1.01 in 16 cells, 1.0066 with 12 cones, 1.0034 with 24; "
-    "the mean is .998",
-    ("VCT", "6"): "a sub-frame has 150 directions a point, and which of them end on the lit floor changes as points move by half "
-    "a pixel: 2.2 %, 1.3 % with 12 cones; in blocks of 4 pixels 3.1 %, since light falls off between what they share",
-}
+KNOWN: dict[tuple[str, str], str] = {}
 
 
 @dataclass(frozen=True)
