@@ -2,8 +2,8 @@
 """LPV on scenes made by code against one bounce of Cycles, pass by pass: the numbers of docs/techniques/lpv.md.
 
 ``.venv/bin/python scripts/score_lpv.py --cases blocks,fog --sweep lpv.resolution=16,32 --times`` prints a line per case, setting
-and pass, gain and errors, and with ``--times`` what each of LPV's passes cost. ``--snapshot FILE.npz`` (``quartet snapshot``) gives
-these times of any scene, in place of the cases.
+and pass, gain and errors, and with ``--times`` what each of LPV's passes cost. ``--snapshot FILE.npz`` (``quartet snapshot``)
+gives these times of any scene, in place of the cases.
 """
 
 from __future__ import annotations
