@@ -448,6 +448,9 @@ class GeometryInjection(Pass):
         ctx = frame.gl.ctx
         frame.resources["lpv.faces"].clear()
         fbo = frame.targets(planned)
+        # Nothing is written to what the surfaces are drawn to. Were it, llvmpipe would take a tile of 64 pixels that one
+        # triangle fills for hidden behind it and drop the triangles before, with their atomics: in 40 cells a box had holes.
+        fbo.color_mask = (False, False, False, False)
         fbo.use()
         fbo.scissor = None
         ctx.enable_only(moderngl.NOTHING)
