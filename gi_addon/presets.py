@@ -48,7 +48,7 @@ PRESETS: dict[str, Preset] = {
         {**_OURS, "samples": 1, "viewport_samples": 8, "bounces": 1, "gather_scale": 8, "shadows.resolution": 512, "ao.steps": 6,
          "world.samples": 2, "world.resolution": 256,
          "rsm.resolution": 256, "rsm.samples": 48, "lpv.resolution": 16, "vct.resolution": 32,
-         "vct.cones": 8, "ssdo.samples": 48, "ssdo.layers": 1, "ssdo.margin": 0.1},
+         "vct.cones": 4, "ssdo.samples": 48, "ssdo.layers": 1, "ssdo.margin": 0.1},
     ),
     # Against a Cycles that bounces on, later bounces are worth more than all else, and in grids they cost next to nothing
     # while the light stands still. Sub-frames average every other noise, so each takes few cones and samples; virtual lights are
@@ -58,7 +58,7 @@ PRESETS: dict[str, Preset] = {
         {**_OURS, "samples": 4, "viewport_samples": 16, "bounces": 3, "gather_scale": 4, "shadows.resolution": 1024,
          "ao.steps": 12, "world.samples": 4, "world.resolution": 512,
          "rsm.resolution": 512, "rsm.samples": 100, "lpv.resolution": 32, "vct.resolution": 64,
-         "vct.cones": 6, "ssdo.samples": 48},
+         "vct.cones": 4, "ssdo.samples": 48},
     ),
     "FINAL": Preset(
         # Cycles' own default is four diffuse bounces.
@@ -66,7 +66,7 @@ PRESETS: dict[str, Preset] = {
         {**_OURS, "samples": 16, "viewport_samples": 64, "bounces": 4, "gather_scale": 4, "shadows.resolution": 2048,
          "ao.steps": 16, "world.samples": 4, "world.resolution": 1024,
          "rsm.resolution": 512, "rsm.samples": 200, "lpv.resolution": 32, "vct.resolution": 64,
-         "vct.cones": 6, "ssdo.samples": 48},
+         "vct.cones": 4, "ssdo.samples": 48},
     ),
 }  # fmt: skip
 

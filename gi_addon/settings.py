@@ -10,7 +10,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -261,12 +261,17 @@ class SSDOSettings:
 class VCTSettings:
     """Voxel cone tracing (Crassin et al. 2011)."""
 
+    # Blocks share where their cones end, the better the nearer they are to one another: fewer rows of blocks than this up the
+    # picture are more error for no less time (docs/techniques/vct.md), since all the more pixels lie beside edges and gather for
+    # themselves.
+    block_rows: ClassVar[int] = 72
+
     resolution: int = _setting(
         64, "Resolution", "Cells along the longest side of the voxel grid", low=16, high=512,
         higher="thinner walls hold, finer bounce light", lower="faster, less memory",
     )  # fmt: skip
     cones: int = _setting(
-        6, "Cones", "Cones traced from each point into its hemisphere and sub-frame", low=1, high=64,
+        12, "Cones", "Cones traced from each point into its hemisphere and sub-frame", low=1, high=64,
         higher="finer directions, sharper contact", lower="faster, blurrier",
     )  # fmt: skip
     shadow_cones: bool = _setting(
@@ -338,6 +343,11 @@ class Settings:
     ssdo: SSDOSettings = _group(SSDOSettings)
 
     # -- access by dotted name ---------------------------------------------------------------------------------
+
+    @property
+    def own(self) -> Any:
+        """The technique's own group; None where it has none."""
+        return getattr(self, self.technique.lower(), None)
 
     def get(self, path: str) -> Any:
         """Value at a dotted ``path`` such as ``rsm.samples``. Raises SettingError for an unknown one."""

@@ -161,3 +161,30 @@ def test_all_that_looks_light_up_knows_all_grids(gl, bounces):
     for name in outputs:
         assert np.isfinite(two[name]).all() and two[name].mean() == pytest.approx(one[name].mean(), rel=0.1), name
         assert np.abs(two[name] - one[name]).max() > 0.0
+
+
+def test_occlusion_sees_a_wall_at_the_border_of_the_inner_grid(gl):
+    """A wall just behind the inner grid's border: floor half a metre before it is as open as with one grid."""
+    floor, black = np.array([[[-4.0, -4, 0], [4, -4, 0], [4, 4, 0], [-4, 4, 0]]]), scenes.diffuse((0.5,) * 3)
+    eye = np.array([-1.9, 0.0, 1.0])
+
+    def scene(x):
+        b = scenes.SceneBuilder("border")
+        b.quads(floor, black)
+        b.quads(np.array([[[x, -4.0, 0], [x, 4, 0], [x, 4, 4], [x, -4, 4]]]), black)
+        b.light(scenes.point_light((-1.0, 0.0, 2.0), 10.0))
+        return b.build(scenes.perspective(eye, (1.0, 0.0, 0.0), 0.9))
+
+    _, inner = nested_grids(find_focus(scene(1.0)), 16, 2, eye)
+    border = inner.origin[0] + inner.size[0] * inner.cell
+    assert -1.0 < border < 3.0
+    moved = scene(border + 0.2 * inner.cell)
+    assert nested_grids(find_focus(moved), 16, 2, eye)[1] == inner
+    one, two = (
+        make(moved, "Ambient Occlusion", technique="LPV", samples=4, resolution=(48, 27), lpv__resolution=16, lpv__cascades=c,
+             ao__distance=3.0).passes["Ambient Occlusion"][..., 0]
+        for c in ("1", "2")
+    )  # fmt: skip
+    middle = (slice(6, 20), slice(12, 36))
+    assert one[middle].mean() < 0.93
+    assert two[middle].mean() == pytest.approx(one[middle].mean(), abs=0.03)

@@ -59,15 +59,7 @@ TRAITS: dict[str, Traits] = {
 # Failures that are known, with their causes: shown beside the verdict. A test that fails and is not listed here fails the
 # test suite too.
 # Numbers beside a cause are what trying it gave; the others are measured only.
-KNOWN: dict[tuple[str, str], str] = {
-    ("LPV", "1"): "a lamp 0.2 R from the wall: g = 0.944 in a grid of 32 cells. All of the flux ends at the walls and the whole "
-    "sphere's mean is 1.00, but the lit patch lights its own surroundings along the wall, over a rise of a third of a cell: 0.7 "
-    "there, 0.9 to 45 degrees, 1.2 opposite; 288 directions 0.70 and 1.16",
-    ("VCT", "3"): "noise of six cones: the largest pixel has 1.011 of 1.01 in 16 cells, 1.0066 with 12 cones, 1.0034 with 24; "
-    "the mean is .998",
-    ("VCT", "6"): "a sub-frame has 150 directions a point, and which of them end on the lit floor changes as points move by half "
-    "a pixel: 2.2 %, 1.3 % with 12 cones; in blocks of 4 pixels 3.1 %, since light falls off between what they share",
-}
+KNOWN: dict[tuple[str, str], str] = {}
 
 
 @dataclass(frozen=True)

@@ -31,9 +31,7 @@ from ..passes.occupancy import Occupancy
 from ..passes.reflections import GLOSSY_RAY, GLOSSY_TRACED, reflection_sharing
 from ..passes.resolve import Resolve
 from ..passes.screen import (
-    DIRECTION,
     INDIRECT_DIFFUSE,
-    LIGHT,
     LOBE,
     REFRACTING,
     TRANSMISSION_INDIRECT,
@@ -43,6 +41,7 @@ from ..passes.screen import (
     no_gloss,
     no_indirect,
 )
+from ..passes.smoothing import BlockSmoothing, raw_gather
 from ..passes.subsurface import Subsurface, SubsurfaceBack
 from ..passes.volumetric import MEDIUM_UNIFORMS, Volumetric, medium_defines, set_medium
 from ..passes.voxels import (
@@ -58,6 +57,10 @@ from ..passes.voxels import (
 from ..passes.world_guide import WorldGuide
 from ..passes.world_rays import WorldRays
 from ..settings import Settings
+
+# Blocks that the light of one is smoothed over, each way, where nothing that lights them is near (smooth_blocks_frag.glsl). 5 × 5
+# blocks have one set of directions, whose error they share: less than twice as wide is of little use.
+_SMOOTH = 4
 
 
 def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
@@ -80,6 +83,9 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         VoxelAO(),
         ConeHits(),
         SharedHits(),
+        BlockSmoothing(
+            "indirect.low", "Voxel Interpolated Indirect Lighting (smoothing)", in_pairs=True, radius=_SMOOTH, seen="vct.seen"
+        ),
         IndirectLighting(),
         GlossyCones(),
         *reflection_sharing(settings),
@@ -275,6 +281,8 @@ class ConeHits(Pass):
         Texture("vct.hits", "cone_hits", "packed (hits_lib.glsl): offset to what a cone of the block met first, cells; its "
                 "normal; radiance that it brings, W/(m²·sr)", "rgba32ui", lambda f: (*gather_size(f), f.settings.vct.cones),
                 layers=True, scratch=True),
+        Texture("vct.joined", "joined_to", "a bit for each of four neighbours (PAIR in receiver.glsl) that is of the block's "
+                "surface, with nothing between", "r8", gather_size, scratch=True),
     )  # fmt: skip
     uniforms = _CONE_UNIFORMS
     shaders = {"main": {"compute": "engines/vct/gather_low_comp.glsl"}}
@@ -296,10 +304,11 @@ class SharedHits(ScreenPass):
 
     title = "Voxel Interpolated Indirect Lighting (shared cones)"
     figure = "Voxel Interpolated Indirect Lighting Computation"
-    reads = (*_VOLUMES, *_BLOCKS, "vct.hits")
+    reads = (*_VOLUMES, *_BLOCKS, "vct.hits", "vct.joined")
     writes = (
-        Texture("indirect.low", "low_indirect", LIGHT, "rgba32f", gather_size, scratch=True),
-        Texture("indirect.low.direction", "low_direction", DIRECTION, "rgba32f", gather_size, scratch=True),
+        *raw_gather("indirect.low"),
+        Texture("vct.seen", "seen_blocks", "a bit for each of 5 × 5 blocks around that shares its cones", "r32ui", gather_size,
+                scratch=True),
     )  # fmt: skip
     uniforms = _CONE_UNIFORMS
     fragment = "engines/vct/share_frag.glsl"
@@ -317,7 +326,7 @@ class IndirectLighting(ScreenPass):
     title = "Voxel Lighting Computation"
     figure = "Voxel Lighting Computation"
     reads = (
-        *_VOLUMES, "gbuffer.depth", "gbuffer.normal", *_BLOCKS, "vct.hits", "indirect.low", "indirect.low.direction",
+        *_VOLUMES, "gbuffer.depth", "gbuffer.normal", *_BLOCKS, "vct.hits", "vct.seen", "indirect.low", "indirect.low.direction",
     )  # fmt: skip
     writes = (INDIRECT_DIFFUSE,)
     uniforms = _CONE_UNIFORMS

@@ -15,17 +15,11 @@ from .screen import ScreenPass, _screen, no_translucency
 BACKGROUND_DEPTH = 0.0  # no surface: view depths are positive
 
 
-# Blocks share where their cones end, the better the nearer they are to one another: fewer rows of blocks than this up the picture
-# are more error for no less time (docs/techniques/vct.md), since all the more pixels lie beside edges and gather for themselves.
-_ROWS_OF_BLOCKS = 72
-
-
 def gather_scale(facts: Facts) -> int:
-    """Pixels per side of one low-resolution gather."""
+    """Pixels per side of one low-resolution gather: the setting's, or fewer where the technique needs as many rows of blocks."""
     scale = facts.settings.gather_scale
-    if facts.settings.technique != "VCT":
-        return scale
-    return max(1, min(scale, facts.resolution[1] // _ROWS_OF_BLOCKS))
+    rows = getattr(facts.settings.own, "block_rows", 0)
+    return max(1, min(scale, facts.resolution[1] // rows)) if rows else scale
 
 
 def gather_size(facts: Facts) -> tuple[int, int]:

@@ -22,19 +22,20 @@ void clip_polygon(inout vec3 polygon[MOST], inout int count, vec4 plane)
     vec3 kept[MOST];
     int n = 0;
     for (int i = 0; i < MOST; ++i) {
-        if (i < count) {
-            vec3 from = polygon[i];
-            vec3 to = polygon[i + 1 < count ? i + 1 : 0];
-            float d_from = dot(plane.xyz, from) + plane.w;
-            float d_to = dot(plane.xyz, to) + plane.w;
-            if (d_from >= 0.0) {
-                kept[min(n, MOST - 1)] = from;
-                ++n;
-            }
-            if ((d_from >= 0.0) != (d_to >= 0.0)) {
-                kept[min(n, MOST - 1)] = mix(from, to, d_from / (d_from - d_to));
-                ++n;
-            }
+        if (i >= count) {
+            break;
+        }
+        vec3 from = polygon[i];
+        vec3 to = polygon[i + 1 < count ? i + 1 : 0];
+        float d_from = dot(plane.xyz, from) + plane.w;
+        float d_to = dot(plane.xyz, to) + plane.w;
+        if (d_from >= 0.0) {
+            kept[min(n, MOST - 1)] = from;
+            ++n;
+        }
+        if ((d_from >= 0.0) != (d_to >= 0.0)) {
+            kept[min(n, MOST - 1)] = mix(from, to, d_from / (d_from - d_to));
+            ++n;
         }
     }
     count = min(n, MOST);
@@ -145,29 +146,23 @@ void main()
     }
     vec3 facing = abs(front);
     float along = triangle_axis == 0 ? facing.x : triangle_axis == 1 ? facing.y : facing.z;
+    vec3 across = triangle_axis == 0 ? front.yzx : triangle_axis == 1 ? front.zxy : front;
+    int side = across.z < 0.0 ? 1 : 0;
     // A triangle leans by no more than one cell a cell along each of the other two axes: three layers, and one more for
     // a range that ends on a border.
     for (int k = 0; k < 4; ++k) {
         float layer = floor(low) + float(k);
         if (layer > high) {
-            continue;
+            break;
         }
-        vec3 part[MOST] = polygon;
-        int corners = count;
-        clip_polygon(part, corners, vec4(0.0, 0.0, 1.0, -layer));
-        clip_polygon(part, corners, vec4(0.0, 0.0, -1.0, layer + 1.0));
         vec3 turned_cell = vec3(column, layer);
         ivec3 cell = ivec3(triangle_axis == 0 ? turned_cell.zxy : triangle_axis == 1 ? turned_cell.yzx : turned_cell);
-        if (corners == 0 || any(lessThan(cell, ivec3(0))) || any(greaterThanEqual(cell, grid_size))) {
+        if (any(lessThan(cell, ivec3(0))) || any(greaterThanEqual(cell, grid_size))) {
             continue;
         }
-        float seen = seen_area(part, corners);
-        // A cell that is only touched is still taken: one unit.
-        float weight = max(round(seen / along * float(VOXEL_UNITS)), 1.0);
-        vec3 across = triangle_axis == 0 ? front.yzx : triangle_axis == 1 ? front.zxy : front;
-        int side = across.z < 0.0 ? 1 : 0;
 #if VOXEL_MARK
-        imageAtomicOr(cells_now, cell, 1u << (2 * triangle_axis + side) | (round(weight * opacity) > 0.0 ? SOME_OPAQUE : 0u));
+        // Where even a whole face of it would round to nothing, nothing is there.
+        imageAtomicOr(cells_now, cell, 1u << (2 * triangle_axis + side) | (opacity * float(VOXEL_UNITS) >= 0.5 ? SOME_OPAQUE : 0u));
 #else
         uint word = imageLoad(cells_now, cell).r;
         uint kinds = word_kinds(word);
@@ -176,6 +171,13 @@ void main()
         if (kinds >= 64u || own < chunk.x || own >= chunk.x + chunk.y) {
             continue;
         }
+        vec3 part[MOST] = polygon;
+        int corners = count;
+        clip_polygon(part, corners, vec4(0.0, 0.0, 1.0, -layer));
+        clip_polygon(part, corners, vec4(0.0, 0.0, -1.0, layer + 1.0));
+        float seen = seen_area(part, corners);
+        // A cell that is only touched is still taken: one unit.
+        float weight = max(round(seen / along * float(VOXEL_UNITS)), 1.0);
         if (number >= chunk.x) {
             uint at = (number - chunk.x) * uint(VOXEL_WORDS);
             add(at + SUM_AREA, weight);

@@ -1,6 +1,6 @@
 // Harmonics of the radiance in each cell, ∫ L Y dω, by the ordinates' quadrature, and the flux that its walls absorb, over h².
 
-#include "engines/lpv/lpv_lib.glsl"
+#include "engines/lpv/transport_lib.glsl"
 
 layout(local_size_x = 4, local_size_y = 4, local_size_z = 4) in;
 
@@ -16,6 +16,8 @@ void main()
     }
 #if HAS_LPV_ABSORBED
     vec3 absorbed = batch_first == 0 ? vec3(0.0) : imageLoad(lpv_absorbed, volume_texel(cell, 0)).rgb;
+    // A rim's light goes on whole (rim_comp.glsl), and ends in the grid around.
+    bool absorbs = walled(cell) && !in_rim(cell, grid_size, grid_rim);
 #endif
     for (int i = 0; i < batch_count; ++i) {
         vec4 carried = imageLoad(lpv_radiance, volume_texel(cell, i));
@@ -27,7 +29,10 @@ void main()
             sum[c] += value * (ordinate.w * y[c]);
         }
 #if HAS_LPV_ABSORBED
-        absorbed += value * (ordinate.w * max(carried.a - 1.0, 0.0));
+        if (absorbs) {
+            vec3 covered;
+            absorbed += value * (ordinate.w * way_through(cell, ordinate.xyz, covered).taken);
+        }
 #endif
     }
 #if HAS_LPV_ABSORBED

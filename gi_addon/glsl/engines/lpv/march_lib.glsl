@@ -38,11 +38,12 @@ float open_share(vec3 surface_ws, vec3 n, vec3 direction, float reach)
 #if LPV_GRIDS > 1
             if (k > 0) {
                 // The same ray in the grid around, from where it is: half as many cells.
-                float at = 0.5 * next[axis];
+                // It goes on from that one's cell on this side, whose face to the next is the border's.
+                vec3 middle_ws = grid_origin + (vec3(cell) + 0.5) * grid_cell;
                 vec3 from_ws = grid_origin + from * grid_cell;
                 use_grid(--k);
                 from = (from_ws - grid_origin) / grid_cell;
-                cell = ivec3(floor(from + direction * at));
+                cell = ivec3(floor((middle_ws - grid_origin) / grid_cell));
                 next = (vec3(cell) + ahead - from) * vec3(step_) / slope;
                 most = reach / grid_cell;
                 alive = inside_grid(cell, grid_size);

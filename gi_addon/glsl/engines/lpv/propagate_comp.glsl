@@ -8,34 +8,17 @@
 // L_a is the neighbour upwind along axis a, κ_a the covered share of the face between. Each term is a flux per solid angle, so
 // that without surfaces flux is conserved exactly; an isotropic field in a closed black cavity is exact too.
 //
-// Walls at an angle to the grid. Their steps are more area than the wall (|n|₁ times), and would take too much light. With n
-// turned to the cell's side, P = Σ max(ω_a n_a, 0) and M = Σ max(−ω_a n_a, 0) over the axes, a wall of area A has steps of
-// A P in the ordinate's back and of A M in its way, and sends A (P − M) of light where that is positive (ω·n ≥ 0). Then steps
-// in the way let nothing through and take nothing, and of those in the back the share M/P is no gap in what arrives, but air
-// between the steps. Where ω·n < 0 the steps in the back are all air. Neither counts as cross-section, so that the cell's
-// radiance is its flux over the rest:
-//     L = F/K,  F = Σ_a |ω_a| (1 − κ_a) L_a + Q/h²,  K = the smaller of Σ_behind and Σ_ahead of |ω_a| (1 − κ_a [as above]).
-// What goes on is L, or less where the open faces would pass more than F; the rest of F is absorbed. An isotropic field in
-// front of a wall of any direction then stays one. Alpha holds the share of L that goes on; above 1 all does, and alpha − 1 is
-// what is absorbed per L, so that a bounce has the very light that came to an end (reflect_comp.glsl).
+// Walls at an angle to the grid are corrected for their steps (transport_lib.glsl). Alpha holds what goes on through each open
+// face ahead, per L.
 //
 // Deviation from Kaplanyan and Dachsbacher: they send each cell's flux on as a cosine lobe about the face it passed, which
 // turns light by up to 90° per cell: measured in an empty room with one lit wall, the wall opposite gets 0.010 B from 8³ cells
 // and under 0.001 B from 16³ where 0.2 B is right, and finer grids are worse (tests/test_lpv.py). Light that keeps its direction
 // arrives.
 
-#include "engines/lpv/geometry_lib.glsl"
+#include "engines/lpv/transport_lib.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
-
-// min(1, M/P): the share of a step behind that is air.
-float step_share(vec3 w, vec3 n)
-{
-    vec3 parts = w * n;
-    float leaving = dot(max(parts, vec3(0.0)), vec3(1.0));
-    float meeting = -dot(min(parts, vec3(0.0)), vec3(1.0));
-    return leaving > 1e-6 ? min(meeting / leaving, 1.0) : 1.0;
-}
 
 void main()
 {
@@ -69,27 +52,17 @@ void main()
 #if HAS_LPV_AIR
     vec3 here = texelFetch(lpv_air, volume_texel(cell, 0), 0).rgb;
 #endif
-    float behind = whole;
-    float ahead = whole;
-    float open_ahead = whole;
+#if HAS_LPV_WALLS
+    vec3 covered;
+    Way way = way_through(cell, w, covered);
+#else
+    vec3 covered = vec3(0.0);
+    Way way = Way(whole, 1.0, 0.0);
+#endif
     for (int axis = 0; axis < 3; ++axis) {
         ivec3 from = cell;
-        ivec3 to = cell;
         from[axis] += up[axis] ? -1 : 1;
-        to[axis] += up[axis] ? 1 : -1;
-        if (share[axis] == 0.0) {
-            continue;
-        }
-        if (local[axis] > 0) {
-            float coverage = 0.0;
-#if HAS_LPV_WALLS
-            vec4 wall = lpv_walls[face_index(up[axis] ? cell : from, axis)];
-            coverage = wall.x;
-            if (coverage > 0.0) {
-                vec3 n = wall_normal(wall, axis) * (up[axis] ? 1.0 : -1.0);
-                behind -= share[axis] * coverage * step_share(w, n);
-            }
-#endif
+        if (share[axis] > 0.0 && local[axis] > 0) {
             vec4 neighbour = imageLoad(lpv_radiance, volume_texel(from, ordinate));
 #if LPV_LIMITED
             neighbour.rgb *= float(wave > 0); // before the first iteration a cell has only what it emits
@@ -98,27 +71,13 @@ void main()
             // A straight way crosses |ω|₁/h faces per metre, half of it on either side of each.
             neighbour.rgb *= exp((here + texelFetch(lpv_air, volume_texel(from, 0), 0).rgb) * (-0.5 * grid_cell / whole));
 #endif
-            flux += (share[axis] * (1.0 - coverage) * min(neighbour.a, 1.0)) * neighbour.rgb;
+            flux += (share[axis] * (1.0 - covered[axis]) * neighbour.a) * neighbour.rgb;
         }
-#if HAS_LPV_WALLS
-        if (local[axis] < grid_size[axis] - 1) {
-            vec4 wall = lpv_walls[face_index(up[axis] ? to : cell, axis)];
-            float coverage = wall.x;
-            if (coverage > 0.0) {
-                vec3 n = wall_normal(wall, axis) * (up[axis] ? -1.0 : 1.0);
-                ahead -= dot(w, n) >= 0.0 ? share[axis] * coverage : 0.0;
-                open_ahead -= share[axis] * coverage;
-            }
-        }
-#endif
     }
-    float section = min(behind, ahead);
-    // A cell whose every face is a wall that the light leaves, or none of them one it could come from, has no cross-section.
-    section = section > 1e-3 * whole ? section : whole;
-    float passed = open_ahead > section ? section / open_ahead : 1.0 + section - open_ahead;
+    vec4 result = vec4(flux / way.section, way.passed);
 #if LPV_LIMITED
-    imageStore(lpv_carried, volume_texel(cell, ordinate), vec4(flux / section, passed));
+    imageStore(lpv_carried, volume_texel(cell, ordinate), result);
 #else
-    imageStore(lpv_radiance, volume_texel(cell, ordinate), vec4(flux / section, passed));
+    imageStore(lpv_radiance, volume_texel(cell, ordinate), result);
 #endif
 }

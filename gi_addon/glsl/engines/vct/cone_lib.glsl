@@ -112,10 +112,13 @@ Meeting first_sheet(usampler2D sheets, Cone cone, ivec3 cell, uint number, uint 
 {
     Meeting first = NOTHING_MET;
     vec3 from = cone.start - vec3(cell) - 0.5;
-    for (int part = 0; part < 6; ++part) {
-        if ((kinds >> part & 1u) == 0u) {
-            continue;
+    // By what there is, not by part: cones side by side are in cells of other sides, and go through this in step.
+    for (int k = 0; k < 6; ++k) {
+        if (kinds == 0u) {
+            break;
         }
+        int part = findLSB(kinds);
+        kinds &= kinds - 1u;
         uint own = number++;
         Sheet sheet = sheet_at(sheets, own, part);
         float sign_ = (part & 1) == 0 ? 1.0 : -1.0;
@@ -150,8 +153,12 @@ vec3 leaving_light(sampler2D atlas, sampler2D back, usampler2D rows, sampler3D k
     int level = int(clamp(floor(log2(max(cone.spread * met.t, 1.0))), 0.0, grid.levels));
     vec3 p = cone.start + cone.direction * met.t;
     int within = met.cell[met.part >> 1] >> level;
-    vec4 light = met.front ? light_at(atlas, rows, kinds, grid, level, p, within, met.part)
-                           : light_at(back, rows, kinds, grid, level, p, within, met.part);
+    vec4 light;
+    if (met.front) {
+        light = light_at(atlas, rows, kinds, grid, level, p, within, met.part);
+    } else {
+        light = light_at(back, rows, kinds, grid, level, p, within, met.part); // seldom
+    }
     return light.a > 0.0 ? light.rgb * (radiance_unit / light.a) : vec3(0.0);
 }
 

@@ -31,15 +31,6 @@ Hit unpack_hit(uvec4 texel)
                mix(radiance, -radiance, greaterThan(m, uvec3(4095u))));
 }
 
-// A point that gathers.
-struct Gatherer {
-    vec3 at;  // cells
-    vec3 n;
-    vec3 ng;
-};
-
-Gatherer gatherer(vec3 position_ws, vec3 n, vec3 ng) { return Gatherer((position_ws - grid_low) / grid_cell, n, ng); }
-
 // Of the grid's side where the cone leaves it, inwards.
 vec3 box_normal(Cone cone, Grid grid)
 {

@@ -8,7 +8,7 @@
 #include "passes/interpolate.glsl"
 #include "engines/vct/share_lib.glsl"
 
-// Pixels that gather for themselves take of the blocks next to theirs only: of SIDE × SIDE costs as much again as their own cones.
+// Pixels that gather for themselves take of the nearest block of their surface, among those next to theirs, and of all that it sees.
 const int NEXT = 3;
 
 void main()
@@ -32,7 +32,27 @@ void main()
         trace_hits(position_ws, n, ng, cone_run(pixel), own);
         Gatherer here = gatherer(position_ws, n, ng);
         ivec2 block = (pixel + gather_grid_offset()) / GATHER_SCALE;
-        radiance = shared_light(here, own, position_ws, float(GATHER_SCALE) * pixel_width(depth), block, NEXT, false).radiance;
+        Gatherer there;
+        Gatherer next = here;
+        ivec2 nearest = block;
+        float closest = 1e30;
+        for (int i = 0; i < NEXT * NEXT; ++i) {
+            ivec2 other = block + window_step(i, NEXT);
+            if (on_same_surface(here, other, position_ws, float(GATHER_SCALE) * pixel_width(depth), there)) {
+                float way = distance(there.at, here.at);
+                if (way < closest) {
+                    closest = way;
+                    nearest = other;
+                    next = there;
+                }
+            }
+        }
+        uint shared_ = 0u; // a bit for each block around the nearest
+        if (closest < 1e30 && see_each_other(here, next)) {
+            shared_ = texelFetch(seen_blocks, nearest, 0).r | 1u << (SIDE * SIDE / 2);
+        }
+        float nearness;
+        radiance = shared_light(here, own, nearest, SIDE, shared_, nearness).radiance;
     }
     indirect_diffuse = vec4(radiance, 1.0);
 #endif

@@ -12,6 +12,7 @@
 // That a point sees what its neighbour does is taken for granted where both lie on one surface and nothing stands between them.
 
 #include "engines/vct/hits_lib.glsl"
+#include "engines/vct/joined_lib.glsl"
 
 // cosθ cosθ_y/r² of a surface of normal `normal` at `offset`.
 float facing(Gatherer g, vec3 offset, vec3 normal)
@@ -24,75 +25,57 @@ float facing(Gatherer g, vec3 offset, vec3 normal)
     return dot(offset, g.ng) > 0.0 ? cosines / sqr(square) : 0.0;
 }
 
-// The block's point, if there is one and it is on the same surface as `here`, off the plane by no more than `off_plane` (m).
-bool on_same_surface(Gatherer here, ivec2 block, vec3 position_ws, float off_plane, out Gatherer there)
+// Adds a cone's light, its weight, and that over its length in cells.
+void add_hit(inout Gathered sum, inout vec2 weights, Gatherer g, Hit hit, float weight)
 {
-    if (any(lessThan(block, ivec2(0))) || any(greaterThanEqual(block, textureSize(low_depth, 0)))) {
-        return false;
-    }
-    Receiver r = gather_receiver(block);
-    there = gatherer(r.position_ws, r.n, r.ng);
-    return on_surface(r, position_ws, here.ng, off_plane);
-}
-
-// Whether nothing stands between two points of a surface: seen from as far above it as a surface may bend away within two cells.
-bool see_each_other(Gatherer here, Gatherer there)
-{
-    vec3 way = there.at - here.at;
-    float reach = length(way);
-    Cone cone = Cone(here.at + OWN_HEIGHT * here.ng, way / max(reach, 1e-6), 0.0, reach, 0.0);
-    return trace_open(voxel_sheets, voxel_rows, voxel_kinds, voxel_grid(), cone) > 0.5;
-}
-
-// Adds a cone's light and its weight.
-void add_hit(inout Gathered sum, inout float weights, Gatherer g, Hit hit, float weight)
-{
-    weights += weight;
+    weights += weight * vec2(1.0, inversesqrt(max(dot(hit.offset, hit.offset), sqr(LIFT))));
+    sum.radiance += hit.radiance * weight;
+#if GATHER_SCALE > 1 // else nothing is interpolated
     if (hit.radiance != vec3(0.0)) {
-        sum.radiance += hit.radiance * weight;
         sum.direction += directional(normalize(hit.offset), g.n, hit.radiance * weight);
     }
+#endif
 }
 
-// E/π at a point by its own cones, and those of `side` × `side` blocks around `block`; not of `block` itself if the point is its own.
-// All weights add up to the number of cones but for their noise, which their sum takes out: what meets nothing counts as the side of
-// the grid where it leaves.
-Gathered shared_light(Gatherer here, uvec4 own[CONES], vec3 position_ws, float off_plane, ivec2 block, int side, bool is_block)
+// E/π at a point by its own cones, and those of `side` × `side` blocks around `block`, a bit in `shared_` each. All weights add up
+// to the number of cones but for their noise, which their sum takes out: what meets nothing counts as the side of the grid where it
+// leaves. `nearness` is the mean of 1/distance of all that is met, 1/m.
+Gathered shared_light(Gatherer here, uvec4 own[CONES], ivec2 block, int side, uint shared_, out float nearness)
 {
-    Gatherer there;
-    uint shared_ = 0u; // a bit for each block around
-    for (int i = 0; i < side * side; ++i) {
-        ivec2 step_ = ivec2(i % side, i / side) - side / 2;
-        if ((!is_block || step_ != ivec2(0)) && on_same_surface(here, block + step_, position_ws, off_plane, there)) {
-            shared_ |= see_each_other(here, there) ? 1u << i : 0u;
-        }
-    }
     float k = float(bitCount(shared_));
     Gathered sum = Gathered(vec3(0.0), vec4(0.0));
-    float weights = 0.0;
-    for (int j = 0; j < (k > 0.0 ? 0 : CONES); ++j) {
-        add_hit(sum, weights, here, unpack_hit(own[j]), 1.0);
+    vec2 weights = vec2(0.0);
+    Hit hits[CONES];
+    float g_own[CONES];
+    float own_weights[CONES];
+    for (int j = 0; j < CONES; ++j) {
+        hits[j] = unpack_hit(own[j]);
+        g_own[j] = facing(here, hits[j].offset, hits[j].normal);
+        own_weights[j] = k > 0.0 ? 0.0 : 1.0;
     }
     for (int i = 0; i < (k > 0.0 ? side * side : 0); ++i) {
-        ivec2 step_ = ivec2(i % side, i / side) - side / 2;
         if ((shared_ >> i & 1u) == 0u) {
             continue;
         }
-        on_same_surface(here, block + step_, position_ws, off_plane, there);
+        ivec2 other = block + window_step(i, side);
+        Receiver r = gather_receiver(other);
+        Gatherer there = gatherer(r.position_ws, r.n, r.ng);
+        vec3 way = there.at - here.at;
         for (int j = 0; j < CONES; ++j) {
-            Hit hit = unpack_hit(own[j]);
-            float g_here = facing(here, hit.offset, hit.normal);
-            float g_there = facing(there, hit.offset == vec3(0.0) ? hit.offset : here.at + hit.offset - there.at, hit.normal);
-            add_hit(sum, weights, here, hit, g_here / max(k * g_there + g_here, 1e-30) / k);
-            hit = unpack_hit(texelFetch(cone_hits, ivec3(block + step_, j), 0));
+            vec3 offset = hits[j].offset;
+            float g_there = facing(there, offset == vec3(0.0) ? offset : offset - way, hits[j].normal);
+            own_weights[j] += g_own[j] / max(k * g_there + g_own[j], 1e-30) / k;
+            Hit hit = unpack_hit(texelFetch(cone_hits, ivec3(other, j), 0));
             g_there = facing(there, hit.offset, hit.normal);
-            if (hit.offset != vec3(0.0)) {
-                hit.offset += there.at - here.at;
-            }
-            g_here = facing(here, hit.offset, hit.normal);
+            hit.offset += hit.offset == vec3(0.0) ? vec3(0.0) : way;
+            float g_here = facing(here, hit.offset, hit.normal);
             add_hit(sum, weights, here, hit, g_here / max(k * g_there + g_here, 1e-30));
         }
     }
-    sum.radiance /= max(weights, 1e-6);
+    for (int j = 0; j < CONES; ++j) {
+        add_hit(sum, weights, here, hits[j], own_weights[j]);
+    }
+    sum.radiance /= max(weights.x, 1e-6);
+    nearness = weights.y / max(weights.x * grid_cell, 1e-30);
     return sum;
 }
