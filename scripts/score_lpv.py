@@ -2,7 +2,8 @@
 """LPV on scenes made by code against one bounce of Cycles, pass by pass: the numbers of docs/techniques/lpv.md.
 
 ``.venv/bin/python scripts/score_lpv.py --cases blocks,fog --sweep lpv.resolution=16,32 --times`` prints a line per case, setting
-and pass, gain and errors, and with ``--times`` what each of LPV's passes cost.
+and pass, gain and errors, and with ``--times`` what each of LPV's passes cost. ``--snapshot FILE.npz`` (``quartet snapshot``)
+gives these times of any scene, in place of the cases.
 """
 
 from __future__ import annotations
@@ -61,6 +62,12 @@ def reference(scene, names, samples: int, seed: int):
     return {name: image[..., :3] for name, image in cycles.render_passes(made, names).items()}
 
 
+def print_times(result) -> None:
+    """A line per pass that was timed."""
+    for title, spent in result.milliseconds.items():
+        print(f"    {title}: {sum(spent):.0f} ms in {len(spent)} runs", flush=True)
+
+
 def main() -> None:
     import bpy  # noqa: F401 — before the add-on
 
@@ -68,14 +75,23 @@ def main() -> None:
     from gi_addon.compare.metrics import score
     from gi_addon.compare.sheet import comparison
     from gi_addon.compare.studio import Studio, settings_for
+    from gi_addon.scene import Scene
 
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--cases", default="empty,empty-area,blocks-area,glowing")
     parser.add_argument("--samples", type=int, default=256, help="of each half of the reference")
     parser.add_argument("--sweep", default="lpv.resolution=32", help="a setting and its values")
     parser.add_argument("--times", action="store_true")
+    parser.add_argument("--snapshot", help="a snapshot whose passes are timed, at 256 × 144 in 4 sub-frames")
     parser.add_argument("-o", "--output")
     arguments = parser.parse_args()
+    if arguments.snapshot:
+        with Studio() as studio:
+            scene = Scene.load(arguments.snapshot)
+            result = studio.render(scene, settings_for("LPV"), ("Combined",), (256, 144), subframes=4, timed=True)
+        print(f"{arguments.snapshot}: {result.seconds:.1f} s")
+        print_times(result)
+        return
     gi_addon.register()
     path, _, values = arguments.sweep.partition("=")
     found, rows = cases(), []
@@ -89,8 +105,7 @@ def main() -> None:
             for name in names:
                 found_score = score(result.passes[name][..., :3], a[name], b[name])
                 print(f"{case}, {path} {value}, {name}: {found_score.text()}, {result.seconds:.1f} s", flush=True)
-            for title, spent in result.milliseconds.items():
-                print(f"    {title}: {sum(spent):.0f} ms in {len(spent)} runs", flush=True)
+            print_times(result)
         rows += [(f"{case} {name}", result.passes[name][..., :3], (a[name] + b[name]) / 2) for name in names]
     if arguments.output:
         comparison(arguments.output, rows, ("LPV", "Cycles R1"))

@@ -279,6 +279,20 @@ def test_energy_does_not_depend_on_map_or_grid(gl):
     assert max(grids) / min(grids) < 1.03
 
 
+def test_walls_that_fill_whole_tiles_of_the_raster_are_closed(gl):
+    """Two walls of a box one behind the other, each of two large triangles: every face of both is blocked, in any grid."""
+    b = scenes.SceneBuilder("box")
+    b.quads(scenes.box_quads((-1, -1, 0), (1, 1, 2), inward=True), scenes.diffuse((0.5,) * 3))
+    b.light(scenes.point_light((0, 0, 1.5), 10.0))
+    scene = b.build(scenes.perspective((0, -0.8, 1), (0, 1, 1), 1.2))
+    for resolution in (32, 64):
+        walls = volumes(scene, lpv__resolution=resolution, lpv__directions="48")[3]
+        for axis in range(3):
+            layers = np.moveaxis(walls[..., axis, 0], 2 - axis, 0)
+            for layer in (1, resolution - 1):
+                np.testing.assert_array_equal(layers[layer][1:-1, 1:-1], 1.0)
+
+
 def test_light_stays_on_its_side_of_a_thin_wall(gl):
     """Stability test 5, wall and room at an angle to the grid: ≤ 1 % however thin the wall; without occlusion it leaks."""
     b = scenes.SceneBuilder("wall")

@@ -108,6 +108,23 @@ def test_a_floor_beside_a_lit_outer_wall_is_dark_whichever_way_it_faces(gl, up):
     assert floor_light[..., 0].max() < 1e-3 * backs[0, 1][..., 0].max()
 
 
+def test_a_small_lampshade_does_not_mirror_itself(gl):
+    """A cone in black surroundings mirrors next to nothing. It is four cells wide and a tenth of one thick: its sheets are not
+    where it is, and rays met its own lit side (.056 of its light) where the picture shows that nothing stands."""
+    turn = np.linspace(0.0, 2.0 * np.pi, 25)
+    ring = np.stack([np.cos(turn), np.sin(turn), 0.0 * turn], -1)
+    b = scenes.SceneBuilder("lampshade")
+    b.quads(scenes.box_quads((-3.15,) * 3, (3.15,) * 3, inward=True), scenes.diffuse((0.0,) * 3))
+    white = scenes.principled(**{"Base Color": (0.8,) * 3, "Roughness": 0.3, "Specular IOR Level": 1.0})
+    for thick in (0.0, 0.012):
+        low, high = ring * (0.18 - thick) + (0.03, 0.02, 0.04), ring * (0.04 - thick) + (0.03, 0.02, 0.18)
+        b.quads(np.stack([low[:-1], low[1:], high[1:], high[:-1]], 1)[:, :: -1 if thick else 1], white)
+    b.light(scenes.point_light((-1.0, -2.0, 2.0), 100.0))
+    scene = b.build(scenes.perspective((0, -1.5, 0.5), (0, 0, 0.1), 0.35))
+    passes = vct(scene, "Glossy Indirect", "Diffuse Direct", resolution=(64, 36), samples=4).passes
+    assert passes["Glossy Indirect"].mean() < 0.025 * passes["Diffuse Direct"].mean()
+
+
 # --- energy -----------------------------------------------------------------------------------------------------------
 
 
