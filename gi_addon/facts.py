@@ -57,6 +57,7 @@ class Facts:
     glossy: bool
     transmissive: bool
     subsurface: bool
+    bodies: bool  # anything that light scatters below the surface of, seen by the camera or not
     layered: bool
     world_black: bool
     ao_distance: float
@@ -173,6 +174,7 @@ def gather_facts(
         glossy=any(c.glossy for c in some),
         transmissive=any(c.transmissive for c in some),
         subsurface=any(c.subsurface for c in some),
+        bodies=any(compiled[m].subsurface for m in {m for ms in scene.instances.materials for m in ms}),
         layered=any(c.glossy or c.transmissive for c in compiled),
         world_black=world is None or world.black,
         ao_distance=s.ao.distance or scene.world.ao_distance,

@@ -293,7 +293,8 @@ class GPUScene:
         first = 0
         for (material, program, vao), count in zip(prepared, counts, strict=True):
             if count:
-                program["clip_from_world"].write(clip_from_world)
+                if "clip_from_world" in program:  # a driver may drop it where a geometry shader places the vertices
+                    program["clip_from_world"].write(clip_from_world)
                 if material >= 0:
                     self._bind_material(material, options["units"])
                 vao.render_indirect(draws.buffer, moderngl.TRIANGLES, int(count), first)

@@ -8,6 +8,7 @@ import pytest
 from conftest import make
 
 from gi_addon.compare import scenes
+from gi_addon.compare.closed_forms import polygon_form_factor
 from gi_addon.engines import TECHNIQUES
 from gi_addon.scene import Link, Material, Node, ShaderGraph
 
@@ -36,3 +37,18 @@ def test_a_lamp_behind_a_sheet_shines_through_it(gl, technique):
     np.testing.assert_allclose(center, expected, rtol=0.03)
     dark = make(sheet(blocked=True), "Combined", technique=technique, samples=32, resolution=(33, 19), use_indirect_diffuse=False)
     assert dark.passes["Combined"][9, 16, :3].max() < 0.02 * expected[0]
+
+
+def test_a_sheet_shows_the_lit_floor_behind_it_in_lpv(gl):
+    """A sheet that the sun touches nowhere has, in Diffuse Indirect, E/π of its far side: ρ E_sun/π times the form factor of the
+    floor there, from its middle; within 12 %, the width of LPV's cells. The floor before it is dark."""
+    b = scenes.SceneBuilder("sheet over a floor")
+    b.quads(np.array([[[-1, 0, 0], [1, 0, 0], [1, 0, 2], [-1, 0, 2]]], "f4"), translucent((0.8, 0.4, 0.2)))
+    floor = np.array([[-2.0, 0, 0], [2, 0, 0], [2, 3, 0], [-2, 3, 0]])
+    b.quads(floor[None], scenes.diffuse((0.5,) * 3))
+    b.light(scenes.sun_light((0.0, 0.0, -1.0), 4.0))
+    scene = b.build(scenes.perspective((0, -4, 1), (0, 0, 1), 0.2))
+    image = make(scene, "Diffuse Indirect", technique="LPV", samples=4, resolution=(32, 18)).passes["Diffuse Indirect"]
+    form = polygon_form_factor(np.array([[0.0, 0, 1]]), np.array([[0.0, 1, 0]]), floor).mean()
+    expected = 0.5 * 4.0 / np.pi * form
+    np.testing.assert_allclose(image[..., :3].mean(axis=(0, 1)), expected, rtol=0.12)

@@ -12,7 +12,8 @@ from conftest import make
 
 from gi_addon.compare import scenes
 from gi_addon.compare.closed_forms import polygon_form_factor
-from gi_addon.compare.stability_checks import wall_reference
+from gi_addon.compare.stability import PASS, Suite, run_one
+from gi_addon.compare.stability_checks import leak, wall_reference
 from gi_addon.gl import GL, shared
 from gi_addon.outputs import OUTPUTS
 from gi_addon.renderer import Renderer, inspect
@@ -105,6 +106,23 @@ def test_a_floor_beside_a_lit_outer_wall_is_dark_whichever_way_it_faces(gl, up):
     floor_light = (fronts[2, 0] if up else backs[2, 1])[: fronts.shape[2] // 2]
     assert floor_light[..., 3].max() == 1.0
     assert floor_light[..., 0].max() < 1e-3 * backs[0, 1][..., 0].max()
+
+
+def test_a_small_lampshade_does_not_mirror_itself(gl):
+    """A cone in black surroundings mirrors next to nothing. It is four cells wide and a tenth of one thick: its sheets are not
+    where it is, and rays met its own lit side (.056 of its light) where the picture shows that nothing stands."""
+    turn = np.linspace(0.0, 2.0 * np.pi, 25)
+    ring = np.stack([np.cos(turn), np.sin(turn), 0.0 * turn], -1)
+    b = scenes.SceneBuilder("lampshade")
+    b.quads(scenes.box_quads((-3.15,) * 3, (3.15,) * 3, inward=True), scenes.diffuse((0.0,) * 3))
+    white = scenes.principled(**{"Base Color": (0.8,) * 3, "Roughness": 0.3, "Specular IOR Level": 1.0})
+    for thick in (0.0, 0.012):
+        low, high = ring * (0.18 - thick) + (0.03, 0.02, 0.04), ring * (0.04 - thick) + (0.03, 0.02, 0.18)
+        b.quads(np.stack([low[:-1], low[1:], high[1:], high[:-1]], 1)[:, :: -1 if thick else 1], white)
+    b.light(scenes.point_light((-1.0, -2.0, 2.0), 100.0))
+    scene = b.build(scenes.perspective((0, -1.5, 0.5), (0, 0, 0.1), 0.35))
+    passes = vct(scene, "Glossy Indirect", "Diffuse Direct", resolution=(64, 36), samples=4).passes
+    assert passes["Glossy Indirect"].mean() < 0.025 * passes["Diffuse Direct"].mean()
 
 
 # --- energy -----------------------------------------------------------------------------------------------------------
@@ -506,6 +524,22 @@ def test_shared_cones_add_no_light_and_lose_none(gl):
     exact = wall_reference(scene.camera, (64, 36), floor, 0.8 * 5.0)
     image = vct(scene, "Diffuse Indirect", samples=8, resolution=(64, 36), use_ao=False).passes["Diffuse Indirect"][..., 0]
     assert abs(np.nansum(np.where(np.isnan(exact), np.nan, image)) / np.nansum(exact) - 1.0) <= 0.03
+
+
+def test_light_is_not_smoothed_through_a_thin_wall(gl):
+    """A wall of a tenth of a cell: its far side gets .1 % of the lit one's light; 1 % where blocks on either side of it are
+    smoothed over as if one saw the other."""
+    suite = Suite("VCT")
+    assert leak(suite, 0.1, 0.0, 0.0, suite.cell(scenes.thin_wall(0.1))) <= 0.004
+    suite.close()
+
+
+def test_a_wall_keeps_still_while_the_picture_moves_by_half_a_pixel(gl):
+    """Stability test 6: noise against the exact light of each frame's own points, one sub-frame."""
+    suite = Suite("VCT")
+    finding = run_one(suite, "6")
+    suite.close()
+    assert finding.verdict == PASS, finding.quantities
 
 
 @pytest.mark.parametrize("power", [1e-9, 1e9])

@@ -427,6 +427,32 @@ def effect(name: str) -> Scene:
     raise KeyError(name)
 
 
+def window(material: Material, *, thickness: float = 0.2, albedo: float = 0.7) -> Scene:
+    """A dark room, without the wall before the camera, whose only window is a slab of ``material`` that the sun shines on from
+    outside, 10 W/m²."""
+    b = SceneBuilder("window")
+    walls = diffuse((albedo,) * 3, "Walls")
+    b.quads(box_quads((-1, -1, 0), (1, 1, 2), inward=True)[[0, 1, 4, 5]], walls)
+    out = 1 + thickness
+    for low, high in (((-1, 1, 0), (-0.5, out, 2)), ((0.5, 1, 0), (1, out, 2)),
+                      ((-0.5, 1, 0), (0.5, out, 0.6)), ((-0.5, 1, 1.6), (0.5, out, 2))):  # fmt: skip
+        b.quads(box_quads(low, high), walls)
+    b.quads(box_quads((-0.5, 1, 0.6), (0.5, out, 1.6)), material)
+    b.light(sun_light((0.0, -1.0, 0.0), 10.0))
+    return b.build(perspective((0, -2.6, 1.0), (0, 1, 1.0), 0.9))
+
+
+def ball_over_floor(material: Material, *, albedo: float = 0.7) -> Scene:
+    """A ball of ``material``, 40 cm in radius, in a spot's beam over a floor, which lies in its shadow."""
+    b = SceneBuilder("ball-over-floor")
+    b.quads(np.array([[[-1.5, -1.5, 0], [1.5, -1.5, 0], [1.5, 1.5, 0], [-1.5, 1.5, 0]]]), diffuse((albedo,) * 3, "Floor"))
+    place = np.eye(4)
+    place[:3, 3] = (0, 0, 0.6)
+    b.add(sphere(0.4, 48, 24), material, place)
+    b.light(spot_light((0.4, 0.8, 2.6), (0, 0, 0.6), 300.0, size=0.42))
+    return b.build(perspective((0, -3.2, 1.6), (0, 0, 0.4), 0.75))
+
+
 def transformed(scene: Scene, matrix: np.ndarray) -> Scene:
     """``scene`` moved, turned, scaled (uniformly) and mirrored by ``matrix`` (4, 4), in place. Power goes with the square of
     the scale, so that radiance stays; sun strength is that of a surface already. Of a mirrored scene the picture is

@@ -40,6 +40,7 @@ from ..passes.screen import (
 )
 from ..passes.subsurface import Subsurface, SubsurfaceBack
 from ..passes.volumetric import MEDIUM_UNIFORMS, Volumetric, air, medium_defines, no_air, set_medium, step_turn
+from ..passes.voxels import BodyVoxels, voxel_grid
 from ..passes.world_guide import WorldGuide
 from ..passes.world_rays import WorldRays
 from ..scene import SHADOW
@@ -73,6 +74,7 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         RSMGeneration(),
         GeometryInjection(),
         AirVolume(),
+        BodyVoxels(),
         injection,
         GBuffer(),
         CameraTint(),
@@ -296,7 +298,10 @@ class RadianceInjection(Pass):
 
     title = "LPV Radiance Injection"
     figure = "LPV Radiance Injection"
-    reads = ("rsm.depth", "rsm.normal", "rsm.albedo", "rsm.lights", "rsm.views", Optional("lpv.walls"))
+    reads = (
+        "rsm.depth", "rsm.normal", "rsm.albedo", "rsm.lights", "rsm.views", Optional("lpv.walls"),
+        *(Optional(f"voxels.{name}") for name in ("bodies", "sheets", "rows", "kinds")),
+    )  # fmt: skip
     writes = (
         Texture("lpv.source", "lpv_source", "harmonics of the intensity that surfaces send into each cell, over the face of a "
                 "cell, W/(m²·sr)", "rgba32f", _sh_size, access="readwrite"),
@@ -308,6 +313,9 @@ class RadianceInjection(Pass):
         Uniform("tile", "int", "index of the view whose tile is injected"),
         Uniform("fixed_scale", "float", "units of fixed point per W"),
         Uniform("first_group", "int", "1 where the volume starts anew with these sums"),
+        Uniform("body_low", "vec3", "corner of the bodies' voxels, world space, m"),
+        Uniform("body_cell", "float", "width of their cells, m"),
+        Uniform("body_size", "ivec3", "cells along x, y, z"),
         *MEDIUM_UNIFORMS,
     )
     shaders = {
@@ -316,7 +324,7 @@ class RadianceInjection(Pass):
         "source": {"compute": "engines/lpv/source_comp.glsl"},
     }
     depends = ("lights", "world", "transforms", "meshes", "materials")
-    settings = ("lpv.resolution", "lpv.cascades", "lpv.occlusion", *_AIR_SETTINGS)
+    settings = ("lpv.resolution", "lpv.cascades", "lpv.occlusion", "vct.resolution", "use_translucency", *_AIR_SETTINGS)
 
     def __init__(self) -> None:
         self.count = 0
@@ -343,6 +351,9 @@ class RadianceInjection(Pass):
             programs.append(frame.program(planned, "scatter"))
         for program in programs:
             set_medium(frame, program, facts)
+        if planned.has("voxels.bodies"):
+            bodies = voxel_grid(facts)
+            frame.set(inject, body_low=bodies.low, body_cell=bodies.cell, body_size=bodies.size)
         self.count = 1 if planned.stale or frame.subframe == 0 else self.count + 1
         for g in grids(facts):
             for first, (scale, lights) in enumerate(fixed_point_groups(sample.lights, g.cell)):

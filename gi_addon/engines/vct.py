@@ -50,6 +50,7 @@ from ..passes.voxels import (
     Voxelisation,
     all_sheets,
     cell_sheets,
+    no_bodies,
     sheet_counts,
     store_groups,
     voxel_grid,
@@ -99,6 +100,10 @@ def passes(settings: Settings, layers: tuple[str, ...]) -> list[Pass]:
         VoxelVolumetric(),
         Resolve(layers),
     ]
+
+
+# Walks from each sheet of a body in all sub-frames; how many go side by side; how many groups of those share the sheets.
+WALKS, LANES, _WALKERS = 96, 32, 1024
 
 
 def _unlit(facts: Facts) -> str | None:
@@ -166,7 +171,7 @@ class RadianceInjection(Pass):
     figure = "Voxel Radiance Injection, Voxel Anisotropic Mipmap Generation"
     reads = (
         "voxels.sheets", "voxels.rows", "voxels.kinds", "voxels.places",
-        Optional("voxels.emission"), Optional("voxels.lamps"),
+        Optional("voxels.emission"), Optional("voxels.lamps"), Optional("voxels.bodies"),
         Optional("rsm.depth"), Optional("rsm.albedo"), Optional("rsm.normal"), Optional("rsm.lights"), Optional("rsm.views"),
     )  # fmt: skip
     writes = (
@@ -178,29 +183,34 @@ class RadianceInjection(Pass):
                 cell_sheets, when=_one_bounce, scratch=True),
         Texture("vct.bounce_back", "voxel_bounce_back", "the same by its back", "rgba16f", cell_sheets, when=_one_bounce,
                 scratch=True),
+        Texture("vct.walked", "voxel_walked", "by sheet of the cells: vct.radiance after light has walked through bodies",
+                "rgba16f", cell_sheets, when=no_bodies, scratch=True),
     )  # fmt: skip
     uniforms = (
         *_LIGHT_UNIFORMS,
         Uniform("cone_count", "int", "cones that each cell gathers by"),
         Uniform("view_count", "int", "reflective shadow maps in the list"),
         Uniform("add_bounce", "int", "1 when later bounces are known"),
+        Uniform("walk_count", "int", "walks from each sheet of a body; 0 to take over what the last ones found"),
+        Uniform("walk_first", "uint", "number of the first"),
         Uniform("emission_scale", "float", "radiance of the brightest emitter, in units of the volumes"),
         *MEDIUM_UNIFORMS,
     )
     shaders = {
         "main": {"compute": "engines/vct/inject_comp.glsl"},
+        "bodies": {"compute": "engines/vct/bodies_comp.glsl"},
         "bounce": {"compute": "engines/vct/bounce_comp.glsl"},
         "mips": {"compute": "engines/vct/mips_comp.glsl"},
     }
     depends = ("lights", "world", "transforms", "meshes", "materials")
-    settings = ("vct.resolution", "vct.emissive_voxels", "vct.cones", "bounces", "use_area_lights")
+    settings = ("vct.resolution", "vct.emissive_voxels", "vct.cones", "bounces", "use_area_lights", "use_translucency")
     repeats = True
 
     def rate(self, facts: Facts) -> str:
         return RSMGeneration().rate(facts) if facts.rig.bounce.sizes else "static"
 
     def defines(self, facts: Facts) -> dict[str, int]:
-        return medium_defines(facts)
+        return {**medium_defines(facts), "WALK_LANES": LANES}
 
     def run(self, frame: Frame, planned: Planned) -> None:
         program = frame.program(planned)
@@ -223,7 +233,20 @@ class RadianceInjection(Pass):
             frame.set(program, add_bounce=int(k > 0), emission_scale=brightest / values["radiance_unit"], **values)
             set_medium(frame, program, planned.facts)
             _each_sheet(frame, planned, program, 0)
+            if planned.has("voxels.bodies"):
+                self._walk(frame, planned, {**values, "emission_scale": brightest / values["radiance_unit"]})
             build_mips(frame, planned)
+
+    def _walk(self, frame: Frame, planned: Planned, values: dict) -> None:
+        """Replace what sheets of bodies reflect by what leaves them after it has walked below the surface."""
+        program = frame.program(planned, "bodies")
+        moves = self.rate(planned.facts) == "subframe"
+        # A still light's walks are all taken at once; one that moves takes others in each sub-frame.
+        count = max(-(-WALKS // planned.facts.subframes), LANES) if moves else WALKS
+        for walks, light in ((count, "vct.radiance"), (0, "vct.walked")):
+            frame.resources[light].use(12)
+            frame.set(program, walk_count=walks, walk_first=count * frame.subframe if moves else 0, **values)
+            frame.compute(planned, program, (_WALKERS,), (1,))
 
     @staticmethod
     def _bounce(frame: Frame, planned: Planned, values: dict) -> None:

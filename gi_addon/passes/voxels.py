@@ -29,6 +29,7 @@ from ..gl.context import MIB
 from ..gl.errors import GLError
 from ..graph import Buffer, Optional, Pass, Planned, Texture, Uniform
 from ..scene import DIFFUSE
+from .screen import no_translucency
 from .voxel_sheets import most_sheets
 
 # Sums are fixed point: this many units are one cell face of area. 32 bits then hold 4096 layers of surface in one cell.
@@ -37,6 +38,8 @@ UNITS = 1 << 20
 EMISSION_UNITS = 1 << 16
 # Words of sums per sheet (voxel_sums.glsl), and more with emission or lamps.
 _WORDS, _EMISSION_WORDS, _LAMP_WORDS = 15, 3, 1
+# Of a sheet that light scatters below: its area, and × mean free path, share, albedo, roughness and index of the way in.
+_BODY_WORDS = 10
 # For the sums of the sheets that are made at once; OpenGL 4.3 promises storage blocks of no more than 128 MiB.
 _SUMS_BYTES = 128 * MIB
 # A cell has up to this many sheets. What is left of a part's last cell is made with the next part.
@@ -131,8 +134,18 @@ def _size(facts: Facts) -> tuple[int, int, int]:
     return voxel_grid(facts).size
 
 
-def _words(facts: Facts) -> int:
+def _body_word(facts: Facts) -> int:
+    """Where the words of what light scatters below the surface of begin."""
     return _WORDS + (_EMISSION_WORDS if facts.glowing_voxels else _LAMP_WORDS if _lamps(facts) else 0)
+
+
+def _words(facts: Facts) -> int:
+    return _body_word(facts) + (_BODY_WORDS if no_bodies(facts) is None else 0)
+
+
+def no_bodies(facts: Facts) -> str | None:
+    """Why no light walks through bodies from one sheet to another, or None."""
+    return no_translucency(facts) or (None if facts.bodies else "no material scatters below its surface")
 
 
 def _lamps(facts: Facts) -> bool:
@@ -150,6 +163,7 @@ class Voxelisation(Pass):
 
     title = "Voxelization"
     figure = "Voxelization"
+    only = ""  # the flag that materials must have to be drawn
     reads = (Optional("brdf.albedo"), Optional("brdf.average"), Optional("brdf.energy"))
     writes = (
         Texture("voxels.kinds", "voxel_kinds", "r: a bit for each kind of sheet in the cell or, in an empty one, 64 + level of "
@@ -165,6 +179,9 @@ class Voxelisation(Pass):
                 when=lambda f: None if f.glowing_voxels else "no voxel shines: nothing emits, or lights sampled on it do"),
         Texture("voxels.lamps", "voxel_lamps", "by sheet: share of the cell's face that its lamps cover", "r8", cell_sheets,
                 when=lambda f: None if _lamps(f) else "no light is drawn from emissive surfaces"),
+        Texture("voxels.bodies", "voxel_bodies", "by sheet, packed (lib/body_lib.glsl): mean free path below it, share of what "
+                "it reflects that has been there, albedo, way in; 0 where there is none", "rgba32ui", cell_sheets,
+                when=no_bodies),
         Texture("voxels.rows", "voxel_rows", "by row of cells, level after level: sheets before it; then how many there are",
                 "r32ui", lambda f: store_size(sum(_rows(f)) + 1), scratch=True),
         Texture("voxels.places", "voxel_places", "by sheet, level after level, packed: its cell and part", "r32ui", all_sheets,
@@ -195,7 +212,7 @@ class Voxelisation(Pass):
         "rows": {"compute": "passes/voxels_rows_comp.glsl"}, "scan": {"compute": "passes/voxels_scan_comp.glsl"},
     }  # fmt: skip
     depends = ("transforms", "meshes", "materials")
-    settings = ("vct.resolution", "vct.emissive_voxels", "use_area_lights")
+    settings = ("vct.resolution", "vct.emissive_voxels", "use_area_lights", "use_translucency")
 
     def rate(self, facts: Facts) -> str:
         return "subframe" if facts.settings.vct.continuous_voxelization else "static"
@@ -205,7 +222,8 @@ class Voxelisation(Pass):
 
     def defines(self, facts: Facts) -> dict[str, int]:
         return {**_STEPS, "VOXEL_UNITS": UNITS, "VOXEL_WORDS": _words(facts), "VOXEL_EMISSION": int(facts.glowing_voxels),
-                "VOXEL_LAMPS": int(_lamps(facts)), "EMISSION_UNITS": EMISSION_UNITS, "VOXEL_MARK": 0}
+                "VOXEL_LAMPS": int(_lamps(facts)), "EMISSION_UNITS": EMISSION_UNITS, "VOXEL_MARK": 0,
+                "VOXEL_BODIES": int(no_bodies(facts) is None), "SUM_BODY": _body_word(facts)}
 
     def run(self, frame: Frame, planned: Planned) -> None:
         facts = planned.facts
@@ -226,15 +244,14 @@ class Voxelisation(Pass):
             self._draw(frame, planned, grid, {**values, **chunk}, VOXEL_MARK=0)
             frame.bind(planned)
             for slot, texture in enumerate(planned.texture_writes()):
-                if texture.glsl in ("voxel_sheets", "voxel_emission", "voxel_lamps"):
+                if texture.glsl in ("voxel_sheets", "voxel_emission", "voxel_lamps", "voxel_bodies"):
                     frame.resources[texture.name].bind_to_image(slot, read=False, write=True)
             _bind_words(frame)
             frame.set(resolve, **grid.uniforms(), **chunk)
             resolve.run(*store_groups(min(size, sheets - first)))
             frame.gl.ctx.memory_barrier()
 
-    @staticmethod
-    def _draw(frame: Frame, planned: Planned, grid: VoxelGrid, values: dict, **defines: int) -> None:
+    def _draw(self, frame: Frame, planned: Planned, grid: VoxelGrid, values: dict, **defines: int) -> None:
         """All triangles, along the axes that they face."""
         target = frame.pool.framebuffer([frame.resources["voxels.raster"]])
         target.use()
@@ -248,7 +265,7 @@ class Voxelisation(Pass):
             "fragment": "passes/voxels_frag.glsl",
         }  # fmt: skip
         options = {
-            "full": True, "units": len(planned.texture_reads()), "defines": {
+            "full": True, "only": self.only, "units": len(planned.texture_reads()), "defines": {
                 "SURFACE_TABLES": 2 if planned.has("brdf.average") else 0, "SURFACE_SEE_THROUGH_GLASS": 1,
                 "SURFACE_SEEN_BY_CAMERA": 0, "SURFACE_SEEN_BY_SHADOW": 0, **defines,
             },
@@ -296,6 +313,16 @@ class Voxelisation(Pass):
                               f"is {counts[0]} and {sum(counts)}")  # fmt: skip
             planned.memory["sheets"] = int(total[0])
         return planned.memory["sheets"]
+
+
+class BodyVoxels(Voxelisation):
+    """The sheets that light scatters below: what walks go between, in engines without voxels of their own."""
+
+    title = "Body Voxelization"
+    only = "subsurface"
+
+    def absent(self, facts: Facts) -> str | None:
+        return super().absent(facts) or no_bodies(facts)
 
 
 def _bind_words(frame: Frame, level: int = 0, above: int = 0) -> None:

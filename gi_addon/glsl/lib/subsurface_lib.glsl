@@ -1,5 +1,11 @@
 // The medium below a surface, as Cycles' random walk has it: isotropic scattering, no refraction at the boundary.
 
+#include "lib/math_lib.glsl"
+#include "lib/sequence_lib.glsl"
+
+// Farther than this from all sides light diffuses, free paths.
+const float DEEP = 4.0;
+
 // Single-scattering albedo α of the half space that reflects the share A of diffuse light: the fit of M. Chiang, P. Kutz and
 // B. Burley ("Practical and Controllable Subsurface Scattering for Production Path Tracing", SIGGRAPH 2016) extended by
 // M. Wrenninge, R. Villemin and C. Hery ("Path Traced Subsurface Scattering using Anisotropic Phase Functions and
@@ -18,4 +24,30 @@ float diffuse_decay(float alpha)
 {
     float absorbed = 1.0 - alpha;
     return min(sqrt(3.0 * absorbed) * (1.0 - 0.4 * absorbed), 0.9999);
+}
+
+vec3 single_scattering_albedo(vec3 a)
+{
+    return vec3(single_scattering_albedo(a.r), single_scattering_albedo(a.g), single_scattering_albedo(a.b));
+}
+
+// Share of diffuse light of `decay` from the middle of an empty sphere that comes to its side, `radius` free paths away: x/sinh x.
+vec3 share_across_sphere(vec3 decay, float radius)
+{
+    vec3 x = decay * radius;
+    return 2.0 * x / max(exp(min(x, 80.0)) - exp(-x), 2.0 * x);
+}
+
+// A number in [0, 1), and the next state.
+float draw(inout uint state)
+{
+    state = hash_u32(state + 0x9E3779B9u);
+    return unit_float(state);
+}
+
+vec3 draw_direction(inout uint state)
+{
+    float z = 1.0 - 2.0 * draw(state);
+    float phi = TAU * draw(state);
+    return vec3(sqrt(max(1.0 - z * z, 0.0)) * vec2(cos(phi), sin(phi)), z);
 }

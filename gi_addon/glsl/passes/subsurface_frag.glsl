@@ -7,7 +7,7 @@
 // and keeps the share α of its light at each turn; where it leaves, it takes that place's E/π. A half space lit from all sides
 // returns the albedo A, by which Cycles divides its pass, and so is this divided.
 //
-// Deep inside (more than DEEP free paths from all known sides) light diffuses, and a walk leaves the largest empty sphere of
+// Deep inside (more than DEEP free paths, lib/subsurface_lib.glsl, from all known sides) light diffuses, and a walk leaves the largest empty sphere of
 // radius ρ anywhere on it, with the share κρ/sinh(κρ) (M. Muller, "Some Continuous Monte Carlo Methods for the Dirichlet
 // Problem", 1956, with absorption), whatever its steps.
 //
@@ -25,23 +25,8 @@
 const int WALKS = 3;       // a sub-frame's; one for each channel
 const int STEPS = 64;      // what is under way after these is lost
 const int HALVINGS = 4;    // of the step that leaves
-const float DEEP = 4.0;    // free paths
 const float EMPTY = 0.75;  // of the distance to the nearest known side
 const float FAR = 1e30;
-
-// A number in [0, 1), and the next state.
-float draw(inout uint state)
-{
-    state = hash_u32(state + 0x9E3779B9u);
-    return unit_float(state);
-}
-
-vec3 draw_direction(inout uint state)
-{
-    float z = 1.0 - 2.0 * draw(state);
-    float phi = TAU * draw(state);
-    return vec3(sqrt(max(1.0 - z * z, 0.0)) * vec2(cos(phi), sin(phi)), z);
-}
 
 // How far inside the known sides a point is, along their normals, m; negative outside.
 struct Inside {
@@ -155,8 +140,7 @@ void main()
         // Without what layers above take.
         vec3 color = texelFetch(gbuf_diffuse, pixel, 0).rgb;
         vec3 surface_albedo = clamp(color * (entry.z / max(luminance(color), 1e-6)), vec3(1e-3), vec3(1.0));
-        vec3 alpha = vec3(single_scattering_albedo(surface_albedo.r), single_scattering_albedo(surface_albedo.g),
-                          single_scattering_albedo(surface_albedo.b));
+        vec3 alpha = single_scattering_albedo(surface_albedo);
         vec3 decay = vec3(diffuse_decay(alpha.r), diffuse_decay(alpha.g), diffuse_decay(alpha.b));
         bool together = max3(medium.rgb) - min3(medium.rgb) <= 1e-3 * max3(medium.rgb);
         uint seed = hash_u32(uvec2(pixel + view.pixel_offset));
@@ -216,8 +200,7 @@ void main()
                         if (inside > DEEP * path && inside < FAR) {
                             float radius = EMPTY * inside;
                             offset += draw_direction(state) * radius;
-                            vec3 x = decay * (radius / path);
-                            weight *= 2.0 * x / max(exp(min(x, 80.0)) - exp(-x), 2.0 * x);
+                            weight *= share_across_sphere(decay, radius / path);
                         }
                         direction = draw_direction(state);
                         walking = max3(weight) > 1e-3;

@@ -1,6 +1,9 @@
 // Sums of the sheets in the making to means (passes/voxels.py says what a texel is).
 
 #include "passes/voxel_sums.glsl"
+#if VOXEL_BODIES
+#include "lib/body_lib.glsl"
+#endif
 
 layout(local_size_x = 64) in;
 layout(binding = 4, r32ui) uniform uimage3D cells_now;
@@ -47,6 +50,14 @@ void main()
 #if HAS_VOXEL_EMISSION
     vec3 emission = vec3(voxel_sums[first + SUM_EMISSION], voxel_sums[first + SUM_EMISSION + 1u], voxel_sums[first + SUM_EMISSION + 2u]);
     imageStore(voxel_emission, store_texel(own), vec4(emission * (float(VOXEL_UNITS) * color / float(EMISSION_UNITS)), 0.0));
+#endif
+#if HAS_VOXEL_BODIES
+    uint body = sheet + uint(SUM_BODY);
+    float whole = 1.0 / max(float(voxel_sums[body]), 1.0);
+    vec4 path = vec4(voxel_sums[body + 1u], voxel_sums[body + 2u], voxel_sums[body + 3u], voxel_sums[body + 4u]) * whole;
+    vec3 below = vec3(voxel_sums[body + 5u], voxel_sums[body + 6u], voxel_sums[body + 7u]) * whole;
+    vec2 entry = vec2(voxel_sums[body + 8u], voxel_sums[body + 9u]) * whole;
+    imageStore(voxel_bodies, store_texel(own), pack_body(Body(path.rgb * LONGEST_PATH, path.a, below, entry.x, entry.y)));
 #endif
 #if HAS_VOXEL_LAMPS
     imageStore(voxel_lamps, store_texel(own), vec4(min(float(voxel_sums[sheet + SUM_LAMPS]) / float(VOXEL_UNITS), 1.0)));

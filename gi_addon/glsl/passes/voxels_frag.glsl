@@ -4,6 +4,9 @@
 
 #include "surface/surface_point.glsl"
 #include "passes/voxel_sums.glsl"
+#if VOXEL_BODIES
+#include "lib/body_lib.glsl"
+#endif
 
 layout(binding = 4, r32ui) uniform uimage3D cells_now;
 layout(binding = 6, r32ui) readonly uniform uimage2D rows_now;
@@ -212,6 +215,23 @@ void main()
 #if VOXEL_LAMPS
         if (max3(c.emission) > 0.0) {
             add(at + SUM_LAMPS, seen * float(VOXEL_UNITS));
+        }
+#endif
+#if VOXEL_BODIES
+        float scattered = luminance(c.subsurface);
+        if (scattered > 0.0) {
+            uint body = at + uint(SUM_BODY);
+            vec3 path = min(c.subsurface_radius / (scattered * grid_cell), vec3(LONGEST_PATH)) / LONGEST_PATH;
+            vec3 entry = c.subsurface_entry / scattered;
+            vec3 own_albedo = saturate(c.diffuse * (entry.z / max(luminance(c.diffuse), 1e-6))); // without what layers above take
+            add(body, share);
+            for (int i = 0; i < 3; ++i) {
+                add(body + 1u + uint(i), share * path[i]);
+                add(body + 5u + uint(i), share * own_albedo[i]);
+            }
+            add(body + 4u, share * min(scattered / max(luminance(albedo), 1e-6), 1.0));
+            add(body + 8u, share * saturate(entry.x));
+            add(body + 9u, share / max(entry.y, 1.0));
         }
 #endif
 #endif

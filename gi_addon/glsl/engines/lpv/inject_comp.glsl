@@ -10,6 +10,9 @@
 #include "engines/lpv/geometry_lib.glsl"
 #include "lib/sequence_lib.glsl"
 #include "lib/view_lib.glsl"
+#if HAS_VOXEL_BODIES
+#include "engines/lpv/bodies_lib.glsl"
+#endif
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -35,6 +38,9 @@ void main()
             t.flux /= 1.0 + facing * PI * sqr(light.patch_radius) * float(view.subframes);
         }
     }
+#if HAS_VOXEL_BODIES
+    through_body(t, hash_u32(uvec3(uvec2(pixel), view.subframe)));
+#endif
     vec3 at = (t.position_ws - grid_origin) / grid_cell;
     if (any(lessThan(at, vec3(-1.0))) || any(greaterThan(at, vec3(grid_size) + 1.0))) {
         return; // a backdrop far outside (gi_addon/focus.py)

@@ -7,6 +7,10 @@
 #include "lib/refraction_lib.glsl"
 #define RAY_SEES_EMISSION 1
 #include "engines/rsm/raycast_lib.glsl"
+#if RAY_BOUNCES && !HAS_VPLS
+// E/π at a point on the side of normals `ng` and `n`, seen from `eye`: of who has no virtual lights.
+vec3 far_side_light(vec3 position_ws, vec3 ng, vec3 n, vec3 eye);
+#endif
 
 void main()
 {
@@ -18,11 +22,17 @@ void main()
     }
     if (texelFetch(translucent_medium, pixel, 0).g > 0.5) {
         // What scatters light on shows what its far side receives, E/π, tinted.
-#if HAS_VPLS
+#if RAY_BOUNCES
         vec4 normals = texelFetch(translucent_normal, pixel, 0);
         vec2 uv = gl_FragCoord.xy * view.inverse_resolution;
-        vec3 far = gather_some_vpls(position_ws_from_depth(uv, depth), -octahedral_decode(normals.xy),
-                                    -octahedral_decode(normals.zw), 0, 1, 1.0).radiance;
+        vec3 position_ws = position_ws_from_depth(uv, depth);
+        vec3 n = octahedral_decode(normals.xy);
+        vec3 ng = octahedral_decode(normals.zw);
+#if HAS_VPLS
+        vec3 far = gather_some_vpls(position_ws, -n, -ng, 0, 1, 1.0).radiance;
+#else
+        vec3 far = far_side_light(position_ws, -ng, -n, reflect(view_direction_ws(uv), ng));
+#endif
         transmission_indirect = vec4(far * texelFetch(translucent_color, pixel, 0).rgb, 1.0);
 #endif
         return;

@@ -10,6 +10,7 @@
 #include "lib/bsdf_lib.glsl"
 #include "lib/reflection_lib.glsl"
 #include "engines/vct/seen_lib.glsl"
+#include "engines/vct/clear_lib.glsl"
 
 void main()
 {
@@ -29,7 +30,13 @@ void main()
     if (ray.passes) {
         Grid grid = voxel_grid();
         float spread = min(2.0 * sqrt(2.0 / cone_sets) * ray.alpha, 1.0);
-        ConeResult result = trace_seen(grid, surface_cone(grid, ray.position_ws, ray.ng, ray.direction, spread, 1e30));
-        traced = traced_light(result.radiance, result.first.t * grid.cell);
+        Cone cone = surface_cone(grid, ray.position_ws, ray.ng, ray.direction, spread, 1e30);
+        float clear = clear_reach(ray.position_ws, ray.direction, grid.cell);
+        if (clear > 0.0) {
+            cone.start += clear * ray.direction;
+            cone.leaving = 0.0;
+        }
+        ConeResult result = trace_seen(grid, cone);
+        traced = traced_light(result.radiance, (clear + result.first.t) * grid.cell);
     }
 }
