@@ -6,10 +6,12 @@ from __future__ import annotations
 import pytest
 from real_blender import run, run_window
 
+from gi_addon.engines import TECHNIQUES
+
 pytestmark = pytest.mark.realblender
 
 
-@pytest.mark.parametrize("technique", ["RSM", "VCT"])
+@pytest.mark.parametrize("technique", list(TECHNIQUES))
 def test_it_renders_in_the_background(tmp_path, technique):
     """``blender -b``: F12's path without a window; the picture is lit and of the right size. Voxels are drawn by a geometry
     shader, of which this driver keeps less than that of the other tests."""
