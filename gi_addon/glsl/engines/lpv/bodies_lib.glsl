@@ -2,11 +2,11 @@
 // (§IV-C). Volumes of light add up, and this light is carried as all other is, so that it goes into the same one.
 //
 // A texel reflects Φ = ρ E A_t as if all light left where it enters. Of the share σ of it that scatters below the surface it takes
-// one walk (engines/vct/walk_lib.glsl), forwards, between the sheets of the bodies, and stands for w Φ/A that leaves there, w what
+// one walk (passes/body_walk.glsl), forwards, between the sheets of the bodies, and stands for w Φ/A that leaves there, w what
 // the walk keeps and A the half space's albedo; with the share 1 − σ of the texels' light it stands for itself. Many texels
 // light a cell: their mean is the transport's. Where the free path is small ⟨w⟩ = A, and nothing has moved.
 
-#include "engines/vct/walk_lib.glsl"
+#include "passes/body_walk.glsl"
 
 // Moves what a texel sends out, if it does, to where it leaves the body, in cells of the bodies' grid.
 void through_body(inout RsmTexel t, uint seed)

@@ -7,7 +7,7 @@
 // since L_s(x) = σρ/A ⟨w E(y)⟩/π and ρ ∝ A, the albedo of the half space, at both ends. Evenly lit wax of a small free path keeps
 // its L: ⟨w⟩ = A. What a thin one lets through it lacks, and its other side has. Emission does not enter.
 
-#include "engines/vct/walk_lib.glsl"
+#include "passes/body_walk.glsl"
 
 layout(local_size_x = WALK_LANES) in;
 layout(binding = 12) uniform sampler2D light_now; // vct.radiance, or vct.walked when that is due

@@ -6,7 +6,7 @@
 // cannot meet what it starts from, however near. A sheet that two walks' ends are apart by less than this from, in cells, is one
 // place (a cell has one radiance a side): light leaves where it enters.
 
-#include "engines/vct/volume_lib.glsl"
+#include "passes/voxel_cell.glsl"
 #include "lib/subsurface_lib.glsl"
 #include "lib/body_lib.glsl"
 #include "lib/bsdf_lib.glsl"
