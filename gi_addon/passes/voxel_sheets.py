@@ -5,7 +5,8 @@ Memory for sheets is planned by it (passes/voxels.py). A triangle faces one of s
 cell that it meets.
 
 Small and thin triangles, many in one cell, count by the cells of boxes, each cell once: a small one's own box; a thin one is cut
-into slices one cell wide along the longest side of its box.
+into slices one cell wide along the longest side of its box. Of very many triangles all six parts of the cells in their instances'
+boxes count.
 
 For all others let w, h be its extents across the axis that it faces, d the one along it, A the area of its shadow along the axis
 and S of those along the other two, all in cells:
@@ -33,12 +34,40 @@ _TIE = 1e-4
 # Cells along each side of a box whose cells are counted; slices that a triangle is cut into at most.
 _SMALL, _SLICES = 2, 32
 _PARTS = 6
+# Triangles that are looked at together, about 150 bytes each. Scenes that would take longer than so many of them, an instance as
+# long as 64, count by their instances' boxes alone (1.5 s a million are too long to wait for at each change), unless that makes
+# more sheets than so many (52 bytes and more each).
+_BATCH, _MANY, _INSTANCE, _LOOSE = 1 << 19, 1 << 21, 64, 1 << 22
 
 
 def most_sheets(scene: Scene, low: np.ndarray, cell: float, size: tuple[int, int, int], levels: int) -> tuple[int, ...]:
     """The most sheets in each level, the cells first: a coarse cell has what any of its eight has. The grid's corner
     ``low`` (3,) and ``cell`` in m."""
-    corners, facing = _faced(scene, low, cell)
+    taken = np.zeros(size[::-1], np.uint8)  # cells of what is counted by cells, a bit for each part
+    counts = np.zeros(levels + 1)
+    drawn = _drawn(scene)
+    by_boxes = sum(len(scene.meshes[scene.instances.mesh[i]].triangles) + _INSTANCE for i in drawn) > _MANY
+    if by_boxes:
+        boxes = (scene.instance_bounds()[drawn] - low) / cell
+        _take(taken, 1, *_boxes(boxes[:, 0], boxes[:, 1], size))
+        by_boxes = _PARTS * np.count_nonzero(taken) <= _LOOSE
+        taken *= (1 << _PARTS) - 1 if by_boxes else 0
+    if not by_boxes:
+        for corners, facing in _faced(scene, drawn, low, cell):
+            counts += _add(taken, corners, facing, size, levels)
+    for level in range(levels + 1):
+        counts[level] += sum(int(np.count_nonzero(taken & (1 << part))) for part in range(_PARTS))
+        if level < levels:
+            taken = taken[::2] | taken[1::2]
+            taken = taken[:, ::2] | taken[:, 1::2]
+            taken = taken[:, :, ::2] | taken[:, :, 1::2]
+    cells = np.array([np.prod([n >> level for n in size]) for level in range(levels + 1)])
+    counts = np.minimum.accumulate(np.clip(np.ceil(counts), 1, _PARTS * cells))
+    return tuple(int(n) for n in counts)
+
+
+def _add(taken: np.ndarray, corners: np.ndarray, facing: np.ndarray, size: tuple[int, int, int], levels: int) -> np.ndarray:
+    """Take the cells of small and thin triangles; what all others add, level by level."""
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     first, box = _boxes(np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c), size)
     inside = (box > 0).all(axis=1)
@@ -57,49 +86,73 @@ def most_sheets(scene: Scene, low: np.ndarray, cell: float, size: tuple[int, int
     counts = np.zeros(levels + 1)
     for part in range(_PARTS):
         chosen = facing[counted, part]
-        counts += _cells_of(boxes[0][chosen], boxes[1][chosen], size, levels)
+        _take(taken, 1 << part, boxes[0][chosen], boxes[1][chosen])
         chosen = large & facing[:, part]
         for level in range(levels + 1):
             counts[level] += _bound(corners[chosen], first[chosen], box[chosen], level, part >> 1)
-    cells = np.array([np.prod([n >> level for n in size]) for level in range(levels + 1)])
-    counts = np.minimum.accumulate(np.clip(np.ceil(counts), 1, _PARTS * cells))
-    return tuple(int(n) for n in counts)
+    return counts
 
 
-def _faced(scene: Scene, low: np.ndarray, cell: float) -> tuple[np.ndarray, np.ndarray]:
-    """Corners (T, 3, 3) in cells of all triangles that are voxelized, and which of the six parts each may add to (T, 6)."""
-    all_corners, all_facing = [np.zeros((0, 3, 3), "f4")], [np.zeros((0, _PARTS), bool)]
-    for positions, normals, triangles in _instances(scene):
-        corners = ((positions - low) / cell).astype("f4")[triangles]
-        one, other = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-        normal = _cross(one, other)
-        size = np.abs(normal)
-        most = size.max(axis=1)
-        # By so much may the normal be another, on the GPU or here.
-        error = (_TIE * (most + np.abs(one).sum(axis=1) + np.abs(other).sum(axis=1)))[:, None]
-        axes = (size >= most[:, None] - error) & (most > 0.0)[:, None]
-        # The front is where the vertices' normals point.
-        toward = np.einsum("tvk,tk->tv", normals[triangles], normal)
-        along, against = (toward >= -error).any(axis=1)[:, None], (toward <= error).any(axis=1)[:, None]
-        upwards, downwards = normal >= -error, normal <= error
-        facing = [axes & (upwards & along | downwards & against), axes & (upwards & against | downwards & along)]
-        all_corners.append(corners)
-        all_facing.append(np.stack(facing, axis=2).reshape(-1, _PARTS))
-    return np.concatenate(all_corners), np.concatenate(all_facing)
+def _take(taken: np.ndarray, bits: int, first: np.ndarray, box: np.ndarray) -> None:
+    """Set ``bits`` of all cells in boxes from cell ``first`` (N, 3), ``box`` (N, 3) cells a side."""
+    large = (box > _SMALL).any(axis=1) & (box > 0).all(axis=1)
+    for (x, y, z), (nx, ny, nz) in zip(first[large], box[large], strict=True):
+        taken[z : z + nz, y : y + ny, x : x + nx] |= bits
+    first, box = first[~large], box[~large]
+    for offset in np.ndindex((_SMALL,) * 3):
+        x, y, z = (first[(box > offset).all(axis=1)] + np.array(offset, np.int32)).T
+        taken[z, y, x] |= bits
 
 
-def _instances(scene: Scene) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+def _drawn(scene: Scene) -> list[int]:
+    """The instances that are voxelized."""
+    inst = scene.instances
+    finite = np.isfinite(inst.matrix).all(axis=(1, 2))
+    return [i for i in range(len(inst)) if inst.visibility[i] & DIFFUSE and inst.materials[i] and finite[i]]
+
+
+def _faced(scene: Scene, drawn: list[int], low: np.ndarray, cell: float) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Corners (T, 3, 3) in cells of all triangles that are voxelized, and which of the six parts each may add to (T, 6), some
+    at a time."""
+    all_corners, all_facing, count = [], [], 0
+    for positions, normals, triangles in _instances(scene, drawn):
+        placed = ((positions - low) / cell).astype("f4")
+        for k in range(0, len(triangles), _BATCH):
+            some = triangles[k : k + _BATCH]
+            corners = placed[some]
+            one, other = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+            normal = _cross(one, other)
+            extent = np.abs(normal)
+            most = extent.max(axis=1)
+            # By so much may the normal be another, on the GPU or here.
+            error = (_TIE * (most + np.abs(one).sum(axis=1) + np.abs(other).sum(axis=1)))[:, None]
+            axes = (extent >= most[:, None] - error) & (most > 0.0)[:, None]
+            # The front is where the vertices' normals point.
+            toward = np.einsum("tvk,tk->tv", normals[some], normal)
+            along, against = (toward >= -error).any(axis=1)[:, None], (toward <= error).any(axis=1)[:, None]
+            upwards, downwards = normal >= -error, normal <= error
+            facing = [axes & (upwards & along | downwards & against), axes & (upwards & against | downwards & along)]
+            all_corners.append(corners)
+            all_facing.append(np.stack(facing, axis=2).reshape(-1, _PARTS))
+            count += len(some)
+            if count >= _BATCH:
+                yield np.concatenate(all_corners), np.concatenate(all_facing)
+                all_corners, all_facing, count = [], [], 0
+    if count:
+        yield np.concatenate(all_corners), np.concatenate(all_facing)
+
+
+def _instances(scene: Scene, drawn: list[int]) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
     """Positions (V, 3) and unit normals (V, 3), in world space, and triangles (T, 3), of what is voxelized."""
     inst = scene.instances
-    for i in range(len(inst)):
+    for i in drawn:
         mesh, matrix = scene.meshes[inst.mesh[i]], inst.matrix[i]
-        if inst.visibility[i] & DIFFUSE and inst.materials[i] and np.isfinite(matrix).all():
-            # Normals turn by the cofactors; a mirrored triangle winds the other way, its front stays.
-            rows = matrix[:3, :3]
-            cofactors = _cross(rows[[1, 2, 0]], rows[[2, 0, 1]]) * (-1.0 if np.linalg.det(rows) < 0.0 else 1.0)
-            normals = mesh.normals @ (cofactors / max(np.abs(cofactors).max(), 1e-300)).T.astype("f4")
-            normals /= np.maximum(np.sqrt(np.einsum("vk,vk->v", normals, normals)), 1e-20)[:, None]
-            yield mesh.positions.astype("f8") @ rows.T + matrix[:3, 3], normals, mesh.triangles
+        # Normals turn by the cofactors; a mirrored triangle winds the other way, its front stays.
+        rows = matrix[:3, :3]
+        cofactors = _cross(rows[[1, 2, 0]], rows[[2, 0, 1]]) * (-1.0 if np.linalg.det(rows) < 0.0 else 1.0)
+        normals = mesh.normals @ (cofactors / max(np.abs(cofactors).max(), 1e-300)).T.astype("f4")
+        normals /= np.maximum(np.sqrt(np.einsum("vk,vk->v", normals, normals)), 1e-20)[:, None]
+        yield mesh.positions.astype("f8") @ rows.T + matrix[:3, 3], normals, mesh.triangles
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -145,22 +198,6 @@ def _slices(corners: np.ndarray, first: np.ndarray, box: np.ndarray, size: tuple
             firsts.append(slice_first[inside])
             boxes.append(slice_box[inside])
     return np.concatenate(owners), np.concatenate(firsts), np.concatenate(boxes)
-
-
-def _cells_of(first: np.ndarray, box: np.ndarray, size: tuple[int, int, int], levels: int) -> list[int]:
-    """How many cells of each level are in any of boxes from cell ``first`` (N, 3) of no more than _SMALL cells a side."""
-    taken = np.zeros(size[::-1], bool)
-    for offset in np.ndindex((_SMALL,) * 3):
-        within = (box > offset).all(axis=1) if any(offset) else slice(None)
-        x, y, z = (first[within] + np.array(offset, np.int32)).T
-        taken[z, y, x] = True
-    counts = [int(np.count_nonzero(taken))]
-    for _ in range(levels):
-        taken = taken[::2] | taken[1::2]
-        taken = taken[:, ::2] | taken[:, 1::2]
-        taken = taken[:, :, ::2] | taken[:, :, 1::2]
-        counts.append(int(np.count_nonzero(taken)))
-    return counts
 
 
 def _bound(corners: np.ndarray, first: np.ndarray, box: np.ndarray, level: int, axis: int) -> float:
