@@ -8,29 +8,13 @@ import pytest
 import voxel_store
 from conftest import make
 from test_lpv import flux_of, volumes
-from test_subsurface import albedo_of_turns, lit_slab, wax
+from test_subsurface import lit_slab, slab, wax
 
 from gi_addon.compare import scenes
 from gi_addon.engines.vct import radiance_unit
 from gi_addon.gl import GL, shared
 from gi_addon.renderer import Renderer, inspect
 from gi_addon.settings import Settings
-
-
-def slab_lit_evenly(thickness: float, albedo: float, count: int = 40000) -> tuple[float, float]:
-    """(transmitted, returned) share of what comes evenly from all sides to a slab ``thickness`` free paths thick, whose surface
-    does not refract: walks in one dimension, whose standard error is below .0025."""
-    rng = np.random.default_rng(1)
-    alpha = min(albedo_of_turns(albedo), 0.999999)
-    depth, slope, weight = np.zeros(count), np.sqrt(rng.random(count)), 1.0
-    through = back = 0.0
-    for _ in range(512):
-        depth = depth - slope * np.log(1.0 - rng.random(len(depth)))
-        through += weight * np.count_nonzero(depth > thickness)
-        back += weight * np.count_nonzero(depth < 0.0)
-        depth = depth[(depth >= 0.0) & (depth <= thickness)]
-        slope, weight = 2.0 * rng.random(len(depth)) - 1.0, weight * alpha
-    return through / count, back / count
 
 
 def settings(technique: str, **changed) -> Settings:
@@ -73,7 +57,7 @@ def sun_on_ball(material):
 def test_a_slabs_sheets_send_out_what_walks_let_through_and_return(gl):
     """π L/E of the far and of the near side of a slab two free paths thick and less than a cell, lit evenly from one side."""
     light = voxels(lit_slab(0.1, wax(0.05), 1.0))
-    through, back = slab_lit_evenly(2.0, 0.8)
+    through, back = slab(2.0, 0.8, evenly=True)
     middle = (slice(12, 20), slice(None), slice(12, 20))
     # The sun goes along +y: it shines on what faces −y, part (1, 1).
     assert np.pi / 3.0 * radiance(light[1, 1][middle]) == pytest.approx(back, abs=0.02)
@@ -109,7 +93,7 @@ def test_a_slabs_flux_goes_into_the_volume_on_the_side_that_it_leaves(gl):
     """Of 48 W that the sun sends into a slab of 4 × 4 m: by the sources' sum, and by their first moment, 2/3 of the far side's
     flux less the near one's."""
     grid, source, _, _ = volumes(lit_slab(0.1, wax(0.05), 1.0), lpv__cascades="1")
-    through, back = slab_lit_evenly(2.0, 0.8)
+    through, back = slab(2.0, 0.8, evenly=True)
     assert flux_of(source, grid.cell).mean() / 48.0 == pytest.approx(through + back, abs=0.02)
     first = np.sqrt(4.0 * np.pi / 3.0) * source[1, ..., 0].sum() * grid.cell**2  # c₁: along y
     assert 1.5 * first / 48.0 == pytest.approx(through - back, abs=0.02)

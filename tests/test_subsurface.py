@@ -21,12 +21,12 @@ def albedo_of_turns(albedo: float) -> float:
     return (1.0 - blend) * low + blend * 0.496310210422 * np.arctan((4.23190299701 + 0.00310603949088) * albedo) ** 2.40602999408
 
 
-def slab(thickness: float, albedo: float, count: int = 40000) -> tuple[float, float]:
-    """(transmitted, returned) share of what goes straight into a slab ``thickness`` free paths thick: walks in one dimension,
-    whose standard error is below .0025."""
+def slab(thickness: float, albedo: float, count: int = 40000, *, evenly: bool = False) -> tuple[float, float]:
+    """(transmitted, returned) share of what goes straight, or ``evenly`` from all sides, into a slab ``thickness`` free paths thick
+    whose surface does not refract: walks in one dimension, whose standard error is below .0025."""
     rng = np.random.default_rng(1)
     alpha = min(albedo_of_turns(albedo), 0.999999)
-    depth, slope, weight = np.zeros(count), np.ones(count), 1.0
+    depth, slope, weight = np.zeros(count), np.sqrt(rng.random(count)) if evenly else np.ones(count), 1.0
     through = back = 0.0
     for _ in range(512):
         depth = depth - slope * np.log(1.0 - rng.random(len(depth)))
