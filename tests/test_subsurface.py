@@ -22,8 +22,8 @@ def albedo_of_turns(albedo: float) -> float:
 
 
 def slab(thickness: float, albedo: float, count: int = 40000, *, evenly: bool = False) -> tuple[float, float]:
-    """(transmitted, returned) share of what goes straight, or ``evenly`` from all sides, into a slab ``thickness`` free paths thick
-    whose surface does not refract: walks in one dimension, whose standard error is below .0025."""
+    """(transmitted, returned) share of what goes straight, or ``evenly`` from all sides, into a slab ``thickness`` free paths
+    thick whose surface does not refract: walks in one dimension, whose standard error is below .0025."""
     rng = np.random.default_rng(1)
     alpha = min(albedo_of_turns(albedo), 0.999999)
     depth, slope, weight = np.zeros(count), np.sqrt(rng.random(count)) if evenly else np.ones(count), 1.0
