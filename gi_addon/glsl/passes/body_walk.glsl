@@ -72,9 +72,7 @@ bool leaves_body(usampler2D sheets, usampler2D rows, sampler3D kinds, usampler2D
                 float height = sheet_height(sheet, part, from);
                 if (rise > 0.0 && height + rise * end > 0.0) {
                     float at = clamp(-height / rise, t, end);
-                    vec2 uv = across_axis(from + d * at, part >> 1);
-                    ivec2 square = clamp(ivec2(floor((uv + 0.5) * 4.0)), ivec2(0), ivec2(3));
-                    if (at < first && (sheet.squares >> (square.x + 4 * square.y) & 1u) == 1u) {
+                    if (at < first && covers(sheet, across_axis(from + d * at, part >> 1))) {
                         first = at;
                         walk.number = own;
                         walk.part = part;

@@ -60,6 +60,11 @@ vec3 sheet_point(Sheet sheet, int part, vec2 uv)
     return along_axis(sheet.height - dot(across_axis(sheet.slant, part >> 1), uv), uv, part >> 1);
 }
 
-vec2 square_middle(int square) { return (vec2(square & 3, square >> 2) + 0.5) * 0.25 - 0.5; }
+float squares_share(uint squares) { return float(bitCount(squares)) / float(SQUARES * SQUARES); }
 
-float squares_share(uint squares) { return float(bitCount(squares)) / 16.0; }
+// Whether the sheet covers the square at (u, v), in cells from the cell's middle.
+bool covers(Sheet sheet, vec2 uv)
+{
+    ivec2 square = clamp(ivec2(floor((uv + 0.5) * float(SQUARES))), ivec2(0), ivec2(SQUARES - 1));
+    return (sheet.squares >> (square.x + SQUARES * square.y) & 1u) == 1u;
+}

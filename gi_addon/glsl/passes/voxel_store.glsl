@@ -2,6 +2,13 @@
 // sheets are before its own in its row of cells along x; a row knows how many are before it. All sheets of all rows of the cells
 // come first, then those of the coarser levels. A sheet's number is its place in all textures of sheets.
 
+// A cell's face is known by squares, so many along each side: a sheet has a bit for each, u fastest. As many as half a word holds.
+const int SQUARES = 4;
+const float SQUARE = 1.0 / float(SQUARES); // width, cells
+
+// (u, v) of a square's middle, in cells from the cell's middle.
+vec2 square_middle(int square) { return (vec2(square % SQUARES, square / SQUARES) + 0.5) * SQUARE - 0.5; }
+
 const uint STORE_WIDTH = 4096u; // passes/voxels.py: STORE_WIDTH
 
 ivec2 store_texel(uint number) { return ivec2(number % STORE_WIDTH, number / STORE_WIDTH); }

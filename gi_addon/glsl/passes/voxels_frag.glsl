@@ -77,7 +77,7 @@ uint squares_covered(vec3 polygon[MOST], int count, vec2 corner)
     }
     uint bits = 0u;
     for (int square = 0; square < 16; ++square) {
-        vec2 middle = corner + (vec2(square & 3, square >> 2) + 0.5) * 0.25;
+        vec2 middle = corner + 0.5 + square_middle(square);
         bool apart = any(greaterThan(low, middle + 0.125 - TOUCH)) || any(lessThan(high, middle - 0.125 + TOUCH));
         for (int i = 0; i < MOST; ++i) {
             if (i < count) {

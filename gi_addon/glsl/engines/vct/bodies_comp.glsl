@@ -56,7 +56,7 @@ vec3 walked(uint number, ivec3 cell, int part, Body body, vec3 own, int which)
     }
     Sheet sheet = sheet_at(voxel_sheets, number, part);
     int square = covered_square(sheet, int(index) % bitCount(sheet.squares));
-    vec2 uv = square_middle(square) + 0.25 * (vec2(draw(state), draw(state)) - 0.5);
+    vec2 uv = square_middle(square) + SQUARE * (vec2(draw(state), draw(state)) - 0.5);
     vec3 start = vec3(cell) + 0.5 + sheet_point(sheet, part, uv);
     vec3 direction = way_in(body, frame_from_normal(sheet_normal(sheet, part)), fract(r2_sequence(index) + unit_shift(seed)), state);
     Grid grid = Grid(grid_low, grid_cell, vec3(grid_size), grid_levels);

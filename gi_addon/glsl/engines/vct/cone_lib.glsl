@@ -138,8 +138,7 @@ Meeting first_sheet(usampler2D sheets, Cone cone, ivec3 cell, uint number, uint 
         }
         float at = clamp(-height / (abs(rise) > 1e-9 ? rise : 1e-9), t, t_out);
         vec2 uv = across_axis(from + cone.direction * at, part >> 1);
-        ivec2 square = clamp(ivec2(floor((uv + 0.5) * 4.0)), ivec2(0), ivec2(3));
-        if (at < first.t && (sheet.squares >> (square.x + 4 * square.y) & 1u) == 1u && reaches(sheet, uv)) {
+        if (at < first.t && covers(sheet, uv) && reaches(sheet, uv)) {
             first = Meeting(at, part, front, cell, normalize(sheet.slant) * (front ? sign_ : -sign_), 0.0, own);
         }
     }
